@@ -2,7 +2,7 @@
 //! 403 x 283 voxels; every method runs, or the one named: `tick [METHOD [RADIUS_MM [TASK]]]`.
 //!
 //! `touch` and `drill` go over the head at 50 mm/s, half a millimetre deep; `feed` goes into it at
-//! 1 mm/s.
+//! 1 mm/s, and `hole` through it at 2.4 mm/s, a hand that leads its burr by 2 mm.
 
 use std::time::Instant;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -19,7 +19,7 @@ fn main() -> Result<(), trepan_volume::BoneError> {
     let radius_mm = std::env::args().nth(2).and_then(|text| text.parse().ok()).unwrap_or(3.0);
     for method in Method::all().into_iter().filter(|m| only.as_ref().is_none_or(|name| m.name() == name)) {
         let asked = std::env::args().nth(3);
-        for task in ["touch", "drill", "feed"].into_iter().filter(|task| asked.as_ref().is_none_or(|a| a == task)) {
+        for task in ["touch", "drill", "feed", "hole"].into_iter().filter(|task| asked.as_ref().is_none_or(|a| a == task)) {
             let bone = BoneVolume::new(&head, 400)?;
             stroke(&method, &bone, task, radius_mm, if method.descriptor().is_oracle { 50 } else { 2500 });
         }
@@ -52,9 +52,13 @@ fn stroke(method: &Method, bone: &BoneVolume, task: &str, radius_mm: f32, ticks:
     let (mut out, mut times, mut worst, mut removed) = (RigidStep::default(), Vec::new(), 0.0f32, 0.0);
     let mut last = Vec3::ZERO;
     for t in 0..ticks {
-        // Over the top in a curve, pressed about half a millimetre in; or a millimetre a second in.
-        let feed = task == "feed";
-        let (phase, pressed) = if feed { (0.3, -0.2 + 1e-3 * t as f32) } else { (0.05 * t as f32 / 20.0, 0.5) };
+        // Over the top in a curve, pressed about half a millimetre in; or straight in.
+        let fed = |mm_per_ms: f32| (0.3, mm_per_ms * t as f32 - 0.2);
+        let (phase, pressed) = match task {
+            "feed" => fed(1e-3),
+            "hole" => fed(2.4e-3),
+            _ => (0.05 * t as f32 / 20.0, 0.5),
+        };
         let across = Vec3::new(20.0 * phase.sin(), 20.0 * phase.cos(), 0.0);
         let top = 0.65 * (SKULL * SKULL - across.x.powi(2) - (across.y / 0.95).powi(2)).sqrt();
         let tool = ToolState::at(Pose::from_translation(

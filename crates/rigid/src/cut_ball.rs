@@ -116,8 +116,8 @@ impl Sweep {
         (taken & place.ahead() & covered(before, self.radius).simd_lt(f32x8::ONE)).to_bitmask()
     }
 
-    /// Cosine of the angle between the ways to `node` and the seven after it from where it starts
-    /// and the `rise` of the bone's density there; the sizes of the ways and rises are given.
+    /// Cosine of the angle between a node's way from the start and the `rise` of the density there.
+    /// Of eight nodes from `node` on; `sizes` are those of the ways and rises.
     #[inline]
     pub fn cosine(&self, node: IVec3, rise: Vec3x8, sizes: (f32x8, f32x8)) -> f32x8 {
         let off = node.as_vec3() - self.centre;

@@ -11,6 +11,7 @@ mod clearance;
 mod coupling;
 mod energy;
 mod faults;
+mod hands;
 mod models;
 mod order;
 mod published;
@@ -38,6 +39,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     let mut parts = accuracy::parts();
     parts.extend(models::parts(scope));
     parts.extend(order::parts());
+    parts.extend(hands::parts(scope));
     parts.extend(removal::parts(scope));
     parts.push(Part::new("faults", |_, findings| faults::run(findings)));
     parts.extend(walls::parts(scope));
@@ -51,6 +53,7 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     accuracy::judge(findings);
     models::judge(findings);
     order::judge(findings);
+    hands::judge(findings);
     removal::judge(findings);
 }
 

@@ -51,26 +51,45 @@ const SMOOTH_ORDER: f64 = 1.8;
 const BORE_ORDER: f64 = 1.5;
 const BORE_MM: f64 = 0.01;
 
-/// A smooth form: its signed distance, mm, positive outside of the bone, and the way from bone to
-/// air at a place of a direction.
+/// A smooth form: its signed distance, mm, positive outside of the bone. For each direction it has
+/// a place on its surface, mm, and the unit vector from bone to air there.
 struct Form {
     name: &'static str,
     distance: fn(DVec3) -> f64,
+    place: fn(DVec3) -> DVec3,
     outward: fn(DVec3) -> DVec3,
-    /// Where the surface is, from the form's middle along the direction, mm.
-    surface_mm: f64,
 }
 
-const FORMS: [Form; 3] = [
-    Form { name: "ball", distance: |p| p.length() - FORM_MM, outward: |d| d, surface_mm: FORM_MM },
-    Form { name: HOLLOW, distance: |p| FORM_MM - p.length(), outward: |d| -d, surface_mm: FORM_MM },
+const FORMS: [Form; 4] = [
+    Form { name: "ball", distance: |p| p.length() - FORM_MM, place: |d| FORM_MM * d, outward: |d| d },
+    Form { name: HOLLOW, distance: |p| FORM_MM - p.length(), place: |d| FORM_MM * d, outward: |d| -d },
     Form {
         name: "cylinder",
         distance: |p| p.reject_from_normalized(AXIS).length() - FORM_MM,
-        outward: |d| d.reject_from_normalized(AXIS).normalize(),
-        surface_mm: FORM_MM,
+        place: |d| FORM_MM * across(d),
+        outward: across,
+    },
+    Form {
+        name: "torus",
+        distance: |p| p.distance(RING_MM * across(p)) - TUBE_MM,
+        place: |d| RING_MM * across(d) + TUBE_MM * on_tube(d),
+        outward: on_tube,
     },
 ];
+/// Radius of the torus's middle line and of its tube, mm: it is a saddle on its inner side.
+const RING_MM: f64 = 8.5;
+const TUBE_MM: f64 = 4.0;
+
+/// Unit vector across [`AXIS`] towards a direction.
+fn across(direction: DVec3) -> DVec3 {
+    direction.reject_from_normalized(AXIS).normalize_or_zero()
+}
+
+/// Unit vector out of the torus's tube: all around it as the direction goes along the axis.
+fn on_tube(direction: DVec3) -> DVec3 {
+    let (sin, cos) = (std::f64::consts::PI * direction.dot(AXIS)).sin_cos();
+    cos * across(direction) + sin * AXIS
+}
 const HOLLOW: &str = "hollow ball";
 /// A direction askew to the grid.
 const AXIS: DVec3 = DVec3::new(0.36, 0.48, 0.8);
@@ -153,8 +172,8 @@ fn order(errors: [f64; 3]) -> f64 {
 
 /// The row of every method in a scene. Quick runs leave the oracle out, which is slow.
 fn row_of_all(scene: &str, scope: Scope, errors: impl Fn(&Method, f64) -> Errors) -> Vec<Row> {
-    // A shaft would stand in the far wall of a cavity.
-    let fits = |method: &Method| scene != HOLLOW || !method.has_shaft();
+    // A shaft would stand in the far wall of a cavity or ring.
+    let fits = |method: &Method| ![HOLLOW, "torus"].contains(&scene) || !method.has_shaft();
     let in_scope = |method: &Method| scope.pick(false, true) || !method.descriptor().is_oracle;
     let all = Method::all().into_iter().filter(|method| fits(method) && in_scope(method));
     let row = |method: Method| {
@@ -199,10 +218,10 @@ fn at(place: DVec3, axis: DVec3) -> ToolState {
 
 /// Presses a ball against a form, straight in, and gives its errors there.
 fn press(form: &Form, method: &Method, voxel_mm: f64, direction: DVec3, n: usize) -> Errors {
-    let bone = bone(voxel_mm, FORM_MM + 8.0, shift(n), |p| -SMOOTH_HU / voxel_mm * (form.distance)(p));
-    let outward = (form.outward)(direction);
-    let surface = if outward.dot(direction) < 0.0 { direction } else { outward } * form.surface_mm;
-    let held = |over_mm: f64| at(surface + (BALL_MM + over_mm) * outward, outward);
+    let (place, outward) = ((form.place)(direction), (form.outward)(direction));
+    let half_mm = place.length() + 8.0;
+    let bone = bone(voxel_mm, half_mm, shift(n), |p| -SMOOTH_HU / voxel_mm * (form.distance)(p));
+    let held = |over_mm: f64| at(place + (BALL_MM + over_mm) * outward, outward);
     let mut contact = method.build(&Tool::burr(BALL_MM as f32));
     contact.reset(held(1.0).world_from_tool);
     let mut out = RigidStep::default();
