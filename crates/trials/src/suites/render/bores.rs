@@ -29,8 +29,6 @@ const RADII_MM: [f32; 2] = [1.5, 0.75];
 const FIELDS_MM: [f32; 2] = [9.0, 4.5];
 /// Least SSIM of a bore's surface to its closed form.
 const LIKE: f64 = 0.99;
-/// Burr and field that are known to miss it.
-const GAP_MM: (f32, f32) = (0.75, 4.5);
 /// Step of the march, mm.
 const STEP_MM: f64 = 1.0 / 128.0;
 
@@ -117,7 +115,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
                     .metric("frame_p50_ms", cost)
                     .metric("frame_before_the_bore_p50_ms", before),
             );
-            findings.gates.push(if (radius, field_mm) == GAP_MM { gate.or_known_gap() } else { gate });
+            findings.gates.push(gate);
         }
     }
 }
