@@ -19,7 +19,9 @@ fn main() -> Result<(), trepan_volume::BoneError> {
     let radius_mm = std::env::args().nth(2).and_then(|text| text.parse().ok()).unwrap_or(3.0);
     for method in Method::all().into_iter().filter(|m| only.as_ref().is_none_or(|name| m.name() == name)) {
         let asked = std::env::args().nth(3);
-        for task in ["touch", "drill", "feed", "hole"].into_iter().filter(|task| asked.as_ref().is_none_or(|a| a == task)) {
+        for task in
+            ["touch", "drill", "feed", "hole"].into_iter().filter(|task| asked.as_ref().is_none_or(|a| a == task))
+        {
             let bone = BoneVolume::new(&head, 400)?;
             stroke(&method, &bone, task, radius_mm, if method.descriptor().is_oracle { 50 } else { 2500 });
         }

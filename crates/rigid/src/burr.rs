@@ -7,7 +7,7 @@ use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use glam::IVec3;
 use trepan_geometry::Vec3;
-use trepan_volume::{AIR_HU, BoneVolume, CUT_SURFACE};
+use trepan_volume::{AIR_HU, BoneVolume};
 use wide::{f32x8, i16x8};
 
 /// Fall of the ramp down to which the per-tick law cuts at the burr's surface, HU per voxel.
@@ -29,6 +29,8 @@ const STEP: f32 = 0.01;
 const KEPT_TICKS: f32 = 20.0;
 /// Ticks without the pedal after which a cut begins anew: a pedal may flicker.
 const PAUSE: u32 = 20;
+/// Most nodes that are listed as opened: more than a burr opens in a tick.
+pub(crate) const MOST_OPENED: usize = 1024;
 /// How near the proxy stands to where the burr has cut to, mm.
 const STANDS_MM: f32 = 0.01;
 /// Free way ahead that tells the far side of a bone from a hollow in it, mm.
@@ -88,7 +90,9 @@ pub(crate) struct Burr {
     /// Whether the last cut changed anything.
     changed: bool,
     /// Whether the last cut opened a node or a voxel.
-    opened: bool,
+    has_opened: bool,
+    /// The nodes that it opened.
+    opened: Vec<IVec3>,
     /// Ticks since it worked.
     paused: u32,
     /// Whether the spindle has stalled.
@@ -110,7 +114,8 @@ impl Burr {
             way: 0.0,
             at: None,
             changed: false,
-            opened: false,
+            has_opened: false,
+            opened: Vec::with_capacity(MOST_OPENED + 1),
             paused: 0,
             stalled: false,
             forward: Vec3::ZERO,
@@ -141,8 +146,13 @@ impl Burr {
     }
 
     /// Whether a node or voxel was bone before the last cut and is not any more.
-    pub fn opened(&self) -> bool {
-        self.opened
+    pub fn has_opened(&self) -> bool {
+        self.has_opened
+    }
+
+    /// The nodes that were bone before the last cut and are not any more.
+    pub fn opened(&self) -> &[IVec3] {
+        &self.opened
     }
 
     /// How far from the centre of a burr nodes are read, nodes; its side is `side_mm` long.
@@ -157,7 +167,8 @@ impl Burr {
     pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut, nodes: &mut Nodes, out: &mut RigidStep) {
         self.bites.clear();
         self.paused = 0;
-        (self.changed, self.opened, self.forward) = (false, false, (cut.device - cut.proxy).normalize_or_zero());
+        self.opened.clear();
+        (self.changed, self.has_opened, self.forward) = (false, false, (cut.device - cut.proxy).normalize_or_zero());
         let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
         if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {
             self.rest();
@@ -212,8 +223,8 @@ impl Burr {
             }
         };
         let Taken { cost: spent, volume } = self.paid.taken(radius, way);
-        self.opened = self.open(bone, &sweep, (hollow, way), nodes, out);
-        self.changed = true;
+        self.open(bone, &sweep, (hollow, way), nodes, out);
+        (self.changed, self.has_opened) = (true, !self.opened.is_empty());
         if stop == Stop::At(way) && way > 0.0 {
             self.enough = spent * (STEP / way).min(1.0);
         }
@@ -310,16 +321,17 @@ impl Burr {
     }
 
     /// Adds the burr that has gone `way` to the cut, but nothing nearer than `hollow` to its start.
-    /// Returns whether nodes of bone opened.
     fn open(
-        &self,
+        &mut self,
         bone: &BoneVolume,
         sweep: &Sweep,
         (hollow, way): (f32, f32),
         nodes: &mut Nodes,
         out: &mut RigidStep,
-    ) -> bool {
-        let (mut writer, (cut, density), mut opened) = (bone.cut_writer(), nodes.split(), false);
+    ) {
+        let (mut writer, (cut, density)) = (bone.cut_writer(), nodes.split());
+        // Bone ends where the contact says so.
+        let border = i16x8::splat(cut.border());
         sweep.eights(hollow, BAND + way.max(0.0), |node, place| {
             let (whole, cells) = (cut.holds_eight(node), cut.eight_mut(node));
             let was = i16x8::new(*cells);
@@ -337,17 +349,19 @@ impl Burr {
                 return;
             }
             *cells = now;
-            let border = i16x8::splat(CUT_SURFACE);
             let opens = (rises & was.simd_lt(border) & is.simd_ge(border)).to_bitmask();
             for lane in lanes(opens).filter(is_bone) {
-                opened = true;
-                let voxel = (node + lane as i32 * IVec3::X) / bone.cut_nodes();
+                let at = node + lane as i32 * IVec3::X;
+                // One more than that says that there are more.
+                if self.opened.len() <= MOST_OPENED {
+                    self.opened.push(at);
+                }
+                let voxel = at / bone.cut_nodes();
                 out.broke_through |= !out.broke_through && is_free(bone, voxel, self.forward);
             }
         });
         drop(writer);
         cut.see_all(bone);
-        opened
     }
 
     /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device,
@@ -378,7 +392,7 @@ impl Burr {
         let iso = f32::from(bone.isovalue());
         let fraction = |hu: f32| (0.5 + (hu - iso) / PARTIAL_HU).clamp(0.0, 1.0);
         let mut removed = 0.0;
-        self.opened = false;
+        self.has_opened = false;
         for bite in &self.bites {
             let from = f32::from(bite.hu);
             let whole = loss.round().clamp(0.0, (from - bite.floor_hu).floor());
@@ -386,7 +400,7 @@ impl Burr {
                 bone.set_hu(bite.voxel, (from - whole) as i16);
                 removed += fraction(from) - fraction(from - whole);
                 if from >= iso && from - whole < iso {
-                    self.opened = true;
+                    self.has_opened = true;
                     out.broke_through |= self.forward != Vec3::ZERO && is_free(bone, bite.voxel, self.forward);
                 }
             }

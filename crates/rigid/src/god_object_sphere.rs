@@ -443,7 +443,7 @@ impl RigidContact for GodObjectSphere {
             if self.burr.changed() {
                 self.surface.cut(self.burr.opened());
             }
-            if self.config.shaft && self.burr.opened() {
+            if self.config.shaft && self.burr.has_opened() {
                 self.lean.opened(radius_mm / bone.spacing_mm() + 4.0);
             }
         } else {

@@ -10,10 +10,11 @@
 //! burr works in nearly every tick, since nodes open: about 10 us for 3 mm.
 
 use crate::RigidStep;
-use crate::burr::Burr;
+use crate::burr::{Burr, MOST_OPENED};
 use crate::disc::{Disc, EXTENT};
 use crate::nodes::Nodes;
 use crate::surface::Discs;
+use glam::IVec3;
 use trepan_geometry::{Tool, Vec3};
 use trepan_volume::BoneVolume;
 
@@ -28,6 +29,8 @@ pub(crate) struct LocalSurface {
     at: Option<Vec3>,
     /// Whether the bone has given way since.
     worn: bool,
+    /// Nodes that are not bone any more since.
+    opened: Vec<IVec3>,
     /// Radius of a disc.
     disc: f32,
 }
@@ -36,7 +39,8 @@ impl LocalSurface {
     /// Room for `limit` discs of at most `radius`, around a tool of `tool_mm`.
     pub fn new(tool_mm: f32, limit: usize, radius: f32) -> Self {
         let discs = Discs::new(limit, radius);
-        Self { nodes: Nodes::new(tool_mm), discs, at: None, worn: false, disc: radius }
+        let opened = Vec::with_capacity(MOST_OPENED);
+        Self { nodes: Nodes::new(tool_mm), discs, at: None, worn: false, opened, disc: radius }
     }
 
     /// The bone is another.
@@ -65,12 +69,14 @@ impl LocalSurface {
         changed
     }
 
-    /// The burr has cut; `opened` when a node is not bone any more.
-    pub fn cut(&mut self, opened: bool) {
+    /// The burr has cut; the nodes that `opened` are not bone any more.
+    pub fn cut(&mut self, opened: &[IVec3]) {
         self.worn = true;
         self.discs.wear();
-        if opened {
+        if self.opened.len() + opened.len() > MOST_OPENED {
             self.at = None;
+        } else {
+            self.opened.extend_from_slice(opened);
         }
     }
 
@@ -99,6 +105,10 @@ impl LocalSurface {
         if self.at.is_some_and(|known| known.distance(centre) <= AHEAD) {
             if self.worn {
                 let fine = self.nodes.fine();
+                if !self.opened.is_empty() {
+                    self.discs.open(&fine, &self.opened);
+                    self.opened.clear();
+                }
                 self.discs.refresh(&fine, centre - self.discs.base.as_vec3(), radius + reach);
                 self.worn = false;
                 out.voxels_swept += self.discs.visited;
@@ -114,6 +124,7 @@ impl LocalSurface {
         let hollow = if clear { radius - AHEAD - 1.0 } else { 0.0 };
         self.discs.gather(&self.nodes.fine(), centre, hollow, far);
         (self.at, self.worn) = (Some(centre), false);
+        self.opened.clear();
         out.voxels_swept += read + self.discs.visited;
         out.fallbacks += u32::from(self.discs.overflow > 0);
         true

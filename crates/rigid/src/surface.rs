@@ -58,6 +58,8 @@ pub(crate) struct Discs {
     kept: Kept,
     /// Bone in the rows around the tool, a bit a cell.
     bones: Vec<u128>,
+    /// Where discs were gathered, from [`Discs::base`], and how far from there they may be.
+    around: (Vec3, f32),
     limit: usize,
 }
 
@@ -168,6 +170,7 @@ impl Discs {
         self.forget();
         self.base = at.round().as_ivec3();
         let centre = at - self.base.as_vec3();
+        self.around = (centre, reach);
         // A bone voxel is up to one voxel behind its crossing.
         let (hollow, outer) = (hollow - 1.0, reach + 1.0);
         let edge = (outer + 1.5).ceil() as i32;
@@ -210,6 +213,30 @@ impl Discs {
             }
         });
         self.bones = bones;
+    }
+
+    /// Replaces the discs of edges that crossed before some cells `opened` by those of edges that
+    /// cross now. Whether other edges are grazed is not looked at anew.
+    pub fn open(&mut self, solid: &impl Solid, opened: &[IVec3]) {
+        let mut at = 0;
+        while let Some(edge) = self.edges.get(at) {
+            if solid.is_bone(self.base + edge.voxel) {
+                at += 1;
+            } else {
+                self.edges.swap_remove(at);
+                self.list.swap_remove(at);
+            }
+        }
+        let (centre, reach) = self.around;
+        let within = |x: Vec3| x.distance_squared(centre) <= reach * reach;
+        for cell in opened {
+            for (to, step) in (0..).zip(NEIGHBOURS) {
+                let owner = *cell - step;
+                if solid.is_bone(owner) {
+                    self.edge(solid, owner - self.base, to, within, false);
+                }
+            }
+        }
     }
 
     /// Moves the discs to where the crossings are now, and turns some to their normals. It turns

@@ -45,8 +45,8 @@ const RAMP_HU: f32 = 1000.0;
 pub(super) struct CutField {
     /// Nodes along a voxel's edge.
     pub nodes: i32,
-    /// Bricks along each axis, one beyond the grid on either side among them. At the end of a CT the
-    /// surface of a cut needs nodes beyond it.
+    /// Bricks along each axis, one beyond the grid on either side among them. At the end of a CT
+    /// the surface of a cut needs nodes beyond it.
     bricks: IVec3,
     /// For each brick its place in the pool and 1, or 0.
     table: Box<[AtomicU32]>,

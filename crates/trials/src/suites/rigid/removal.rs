@@ -237,7 +237,7 @@ mod tests {
         let ball = voxels(EDGE, VOXEL_MM, |p| p.length() - 5.0);
         let truth = 4.0 / 3.0 * PI * 125.0;
         assert!((volume_mm3(&ball, 4) / truth - 1.0).abs() < 0.005, "{} {truth}", volume_mm3(&ball, 4));
-        let (said, left) = stroke(&Method::RECOMMENDED, Vec3::new(0.36, 0.48, 0.8), &mut Vec::new());
+        let (said, left) = stroke(&Method::RECOMMENDED, Vec3::new(0.36, 0.48, 0.8), 4, &mut Vec::new());
         assert!((said / swept_mm3() - 1.0).abs() < 0.02 && (left / swept_mm3() - 1.0).abs() < 0.02, "{said} {left}");
     }
 
