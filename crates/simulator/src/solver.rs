@@ -68,7 +68,7 @@ pub(crate) fn build(
     if let Some(method) = trepan_soft::Method::named(tissue.solver) {
         return Ok((method.build(body).map_err(refused)?, Ran::here(method.name())));
     }
-    let config = config(tissue, ingredients);
+    let config = Config { still_mm: tissue.still_mm as f32, ..ingredients.config() };
     let (on_card, remark) = match ingredients.device {
         SolverDevice::Cpu => (None, None),
         _ if ingredients.surface_pressure_mmhg > 0.0 => (None, Some(elsewhere("it has no surface pressure"))),
@@ -99,17 +99,19 @@ fn refused(fault: BodyError) -> SessionError {
     SessionError::Internal(format!("the brain: {fault}"))
 }
 
-fn config(tissue: &Tissue, ingredients: &Ingredients) -> Config {
-    Config {
-        still_mm: tissue.still_mm as f32,
-        mass_scaling: MASS_ADDED,
-        averaged_pressure: ingredients.element == Element::LockingFree,
-        relaxation: match ingredients.relaxation {
-            Relaxation::Off => trepan_tled::Relaxation::NONE,
-            Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
-        },
-        threads: ingredients.threads,
-        ..Config::default()
+impl Ingredients {
+    /// Settings of TLED.
+    pub(crate) fn config(&self) -> Config {
+        Config {
+            mass_scaling: MASS_ADDED,
+            averaged_pressure: self.element == Element::LockingFree,
+            relaxation: match self.relaxation {
+                Relaxation::Off => trepan_tled::Relaxation::NONE,
+                Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
+            },
+            threads: self.threads,
+            ..Config::default()
+        }
     }
 }
 

@@ -36,7 +36,8 @@ pub(crate) fn open_case(
     let requested = recipe(&options.patient);
     let case = import::open_by(program, &inputs, &requested, &Cache::of(&options.patient)?, |pending| {
         let facts = pending.facts;
-        let settled = models.insert(request.settle(&facts, card, |scene, rows| pending.case_errors(scene, rows))?);
+        let settled = models
+            .insert(request.settle(&facts, card, |scene, rows, element| pending.case_errors(scene, rows, element))?);
         pending.stages.suspend(|| settled.log());
         let Setup { bone, tissue, .. } = settled.setup;
         Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..requested })
@@ -97,7 +98,8 @@ pub(crate) fn plan_case(
             let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of(patient)?);
             let mut pending = PendingCase::of(program, &inputs, &recipe, &cache)?;
             let (facts, notes) = (pending.facts, pending.notes.clone());
-            let models = request.settle(&facts, card, |scene, rows| pending.case_errors(scene, rows))?;
+            let models =
+                request.settle(&facts, card, |scene, rows, element| pending.case_errors(scene, rows, element))?;
             pending.store();
             Ok(PlannedCase { models, notes })
         }
@@ -112,7 +114,7 @@ fn on_case(request: ModelRequest, case: &Case, card: impl FnOnce() -> bool) -> R
         brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
     };
     // A case folder lacks the original images, so that errors come from the power laws.
-    request.settle(&facts, card, |_, _| Ok(CaseErrors::default()))
+    request.settle(&facts, card, |_, _, _| Ok(CaseErrors::default()))
 }
 
 /// A case that was built in a folder.

@@ -18,6 +18,7 @@ use crate::case::space::Space;
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs};
 use crate::error::SessionError;
+use crate::ingredients::Element;
 use crate::measure::bone::Skull;
 use crate::measure::tissue::Shape;
 use crate::measure::{CaseErrors, Sight};
@@ -124,10 +125,10 @@ impl<'a> PendingCase<'a> {
         }
     }
 
-    /// Errors of these choices in this case, from the cache if measured before; empty if no opening
-    /// is found.
-    pub fn case_errors(&mut self, scene: &Scene, rows: &Rows) -> Result<CaseErrors, SessionError> {
-        let key = self.cache.under(&self.key, &CaseErrors::about(scene, rows));
+    /// Errors of these choices in this case, with that element, from the cache if measured before.
+    /// Empty if no opening is found.
+    pub fn case_errors(&mut self, scene: &Scene, rows: &Rows, element: Element) -> Result<CaseErrors, SessionError> {
+        let key = self.cache.under(&self.key, &CaseErrors::about(scene, rows, element));
         if let Some(errors) = cached(self.cache, &key, ERRORS) {
             return Ok(errors);
         }
@@ -138,8 +139,9 @@ impl<'a> PendingCase<'a> {
         let sight =
             self.images.as_ref().map(|images| sight(self.program, images, self.requested, scene)).transpose()?;
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let errors =
-            sight.flatten().map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, threads));
+        let errors = sight
+            .flatten()
+            .map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, element, threads));
         store(&errors, self.cache, &key, ERRORS);
         Ok(errors)
     }

@@ -16,8 +16,11 @@ pub struct Key {
     pub about: &'static str,
     /// Value of a session without `--set`; `None` where `--quality` chooses.
     pub usual: Option<&'static str>,
-    /// Values of presets that differ from it.
+    /// Values of qualities that differ from it: those that change more than the tolerance in the
+    /// built-in operation, and run in time (`validate ablation`).
     pub presets: &'static [(Quality, &'static str)],
+    /// Why no quality takes another value than the default, where realism asks for one.
+    pub left_out: Option<&'static str>,
     /// Model that it belongs to.
     pub part: Part,
     /// Values to compare with the default, the most telling first; empty where none means anything
@@ -84,6 +87,7 @@ pub const KEYS: &[Key] = &[
         name: "shaft",
         values: switches,
         about: "contact of the shaft, with torque: the variant of `rigid` that has it",
+        left_out: Some("changes nothing there"),
         compared: on,
         realistic: Some("on"),
         get: |i| i.rigid.map(|name| switch_name(has_shaft(name)).into()),
@@ -94,6 +98,7 @@ pub const KEYS: &[Key] = &[
         name: "shading",
         values: switches,
         about: "force shading on bone, over one voxel",
+        left_out: Some("a filter of the force, not a model of anything"),
         usual: Some("off"),
         compared: on,
         realistic: Some("on"),
@@ -105,6 +110,7 @@ pub const KEYS: &[Key] = &[
         name: "bone-friction",
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction on bone of a tool that does not cut",
+        left_out: Some("changes 0.95 of the tolerance there"),
         usual: Some("off"),
         compared: || vec![FRICTION_ON_BONE.into()],
         realistic: Some(FRICTION_ON_BONE),
@@ -154,6 +160,7 @@ pub const KEYS: &[Key] = &[
         values: names::<Element>,
         about: "tetrahedra; locking-free: averaged nodal pressure (Joldes et al. 2009)",
         usual: Some("plain"),
+        presets: &[(Quality::Auto, "locking-free"), (Quality::Fine, "locking-free")],
         compared: others::<Element>,
         realistic: Some("locking-free"),
         get: |i| Some(name(&i.element)),
@@ -177,6 +184,7 @@ pub const KEYS: &[Key] = &[
         values: names::<Relaxation>,
         about: "stress relaxation; prony: two terms (Miller and Chinzei 2002)",
         usual: Some("off"),
+        presets: &[(Quality::Auto, "prony"), (Quality::Fine, "prony")],
         compared: others::<Relaxation>,
         realistic: Some("prony"),
         get: |i| Some(name(&i.relaxation)),
@@ -234,6 +242,7 @@ pub const KEYS: &[Key] = &[
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction of the first hand's tool on tissue, felt and dragging the tissue",
         usual: Some("off"),
+        presets: &[(Quality::Auto, FRICTION_ON_TISSUE), (Quality::Fine, FRICTION_ON_TISSUE)],
         compared: || vec![FRICTION_ON_TISSUE.into()],
         realistic: Some(FRICTION_ON_TISSUE),
         get: |i| Some(off_or(i.friction)),
@@ -244,6 +253,7 @@ pub const KEYS: &[Key] = &[
         name: "folds",
         values: switches,
         about: "contact of the brain's surface with itself, once the dura is open",
+        left_out: Some("changes nothing there"),
         usual: Some("off"),
         compared: on,
         realistic: Some("on"),
@@ -271,6 +281,7 @@ impl Key {
             about: "",
             usual: None,
             presets: &[],
+            left_out: None,
             part,
             compared: Vec::new,
             realistic: None,
@@ -536,10 +547,15 @@ mod tests {
     }
 
     #[test]
-    fn a_session_without_settings_runs_what_old_recordings_ran() {
-        for quality in Quality::ALL {
-            assert_eq!(Ingredients::of(quality), Ingredients::default());
-        }
+    fn cheap_qualities_run_what_old_recordings_ran_and_others_what_matters() {
+        let matters = Ingredients {
+            element: Element::LockingFree,
+            relaxation: Relaxation::Prony,
+            friction: 0.1,
+            ..Ingredients::default()
+        };
+        let all = Quality::ALL.map(Ingredients::of);
+        assert_eq!(all, [matters.clone(), Ingredients::default(), Ingredients::default(), matters]);
         let fine = Key { usual: Some("plain"), presets: &[(Quality::Fine, "locking-free")], ..Key::of(Part::Tled) };
         assert_eq!(fine.in_quality(Quality::Fine), Some("locking-free"));
         assert_eq!(fine.in_quality(Quality::Draft), Some("plain"));
@@ -576,6 +592,6 @@ mod tests {
     fn the_user_guide_has_the_table_of_keys() {
         let guide = include_str!("../../../../apps/README.md");
         assert!(guide.contains(&markdown()), "paste into apps/README.md:\n{}", markdown());
-        assert!(table().contains("element") && table().contains("[plain]"), "{}", table());
+        assert!(table().contains("element") && table().contains("[plain; auto: locking-free"), "{}", table());
     }
 }

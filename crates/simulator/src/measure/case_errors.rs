@@ -25,6 +25,7 @@ use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
 use super::tissue::{Brains, Fineness, LEAST_MM, Push, Shape};
 use crate::error::SessionError;
+use crate::ingredients::Element;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 use std::sync::Arc;
@@ -72,10 +73,11 @@ pub struct CaseErrors {
 }
 
 impl CaseErrors {
-    /// Measures the choices for a scene's tools and view, with so many threads.
-    pub fn of(sight: &Sight, scene: &Scene, rows: &Rows, threads: usize) -> Self {
+    /// Measures the choices for a scene's tools and view, TLED with that element, with so many
+    /// threads.
+    pub fn of(sight: &Sight, scene: &Scene, rows: &Rows, element: Element, threads: usize) -> Self {
         let others = |threads| (on_bone(sight, scene, rows), in_picture(sight, scene, rows, threads));
-        let tissue = || in_tissue(sight, scene, rows);
+        let tissue = || in_tissue(sight, scene, rows, element);
         let ((bone, picture), tissue) = if threads > 1 {
             std::thread::scope(|scope| {
                 let tissue = scope.spawn(tissue);
@@ -88,12 +90,12 @@ impl CaseErrors {
     }
 
     /// Lists all inputs of the measurement except the case, for a cache key.
-    pub fn about(scene: &Scene, rows: &Rows) -> String {
+    pub fn about(scene: &Scene, rows: &Rows, element: Element) -> String {
         let Scene { tool_radius_mm, press_mm, tissue_motion_mm, probe_radius_mm, view_mm, .. } = *scene;
         let lengths = [tool_radius_mm, press_mm, tissue_motion_mm, probe_radius_mm, view_mm];
         let has = (scene.has_bone, scene.has_tissue, scene.material, scene.picture_pixels);
         let names = (names(&rows.bone), names(&rows.tissue), names(&rows.picture));
-        format!("own {FORM} {lengths:?} {has:?} {names:?}")
+        format!("own {FORM} {element:?} {lengths:?} {has:?} {names:?}")
     }
 
     /// Replaces the power laws of the errors by the measured errors, for measured parts.
@@ -167,7 +169,7 @@ fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)>
     all.map(|(choice, error)| (choice.write(), error)).collect()
 }
 
-fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)> {
+fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec<(Vec<String>, f64)> {
     let choices: Vec<_> =
         rows.tissue.iter().map(|row| row.what).filter(|c| c.solver == "tled" && c.still_mm == 0.0).collect();
     let Some((shape, place)) = sight.brain.as_ref().filter(|_| scene.has_tissue && !choices.is_empty()) else {
@@ -175,7 +177,7 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64
     };
     let slide = Slide { scene: *scene, place: *place, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
     let found = || {
-        let brains = Brains::of(shape, &choices)?;
+        let brains = Brains::of(shape, &choices, element)?;
         let push = Push::of(&slide, &brains, Fineness::QUICK)?;
         // Where the brain is fixed, the error of every mesh would be zero.
         if push.moved_mm() < LEAST_MM { Ok(Vec::new()) } else { push.measure(&brains) }
@@ -228,7 +230,7 @@ mod tests {
         let mut rows = Rows::stored().unwrap();
         rows.bone.retain(|row| row.what.method == "god-object-sphere" && [0.5, 2.0].contains(&row.what.spacing_mm));
         rows.picture.retain(|row| !row.what.sparse && [0.25, 0.5, 1.0].contains(&row.what.detail));
-        let own = CaseErrors::of(&ball(), &scene, &rows, 1);
+        let own = CaseErrors::of(&ball(), &scene, &rows, Element::Plain, 1);
         assert_eq!(own.has(), Parts { bone: true, tissue: false, picture: true });
         let found = own.instead(rows.clone());
         let errors: Vec<f64> = found.bone.iter().map(|row| row.error.at_most(&scene.bone_features())).collect();
@@ -281,7 +283,7 @@ mod tests {
         let rows = Rows::stored().unwrap();
         let far = Sight { entry: 300.0 * Vec3::Z, ..ball() };
         let scene = Scene { picture_pixels: [64, 48], ..Scene::default() };
-        let own = CaseErrors::of(&far, &scene, &rows, 1);
+        let own = CaseErrors::of(&far, &scene, &rows, Element::Plain, 1);
         assert_eq!(own.instead(rows.clone()).bone, rows.bone);
         assert_eq!(CaseErrors::default().instead(rows.clone()), rows);
     }

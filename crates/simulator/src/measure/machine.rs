@@ -5,6 +5,7 @@
 //! that stay in the CPU cache as real ones do. Parts that are not wanted keep the number of
 //! [`Machine::default`].
 
+use crate::ingredients::Ingredients;
 use crate::measure::Wanted;
 use crate::run::clock::Clock;
 use std::f32::consts::TAU;
@@ -24,12 +25,13 @@ const PICTURES: usize = 9;
 /// Edge of a picture, pixels.
 const PIXELS: u32 = 160;
 
-/// Measures this machine. `device_draws`: whether a graphics card draws.
-pub fn machine(wanted: Wanted, device_draws: bool) -> Machine {
+/// Measures this machine. `device_draws`: whether a graphics card draws; tissue is stepped with
+/// these ingredients, on one thread.
+pub fn machine(wanted: Wanted, device_draws: bool, ingredients: &Ingredients) -> Machine {
     let (clock, usual) = (Clock::start(), Machine::default());
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
     Machine {
-        ns_per_tet_step: if wanted.tissue { ns_per_tet_step(&clock) } else { usual.ns_per_tet_step },
+        ns_per_tet_step: if wanted.tissue { ns_per_tet_step(&clock, ingredients) } else { usual.ns_per_tet_step },
         us_per_rigid_tick: if wanted.bone { us_per_rigid_tick(&clock) } else { usual.us_per_rigid_tick },
         ns_per_ray: if wanted.picture && !device_draws { ns_per_ray(&clock) } else { usual.ns_per_ray },
         threads,
@@ -48,12 +50,13 @@ fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
 }
 
 /// Median time per tetrahedron of a TLED step, ns.
-fn ns_per_tet_step(clock: &Clock) -> f64 {
+fn ns_per_tet_step(clock: &Clock, ingredients: &Ingredients) -> f64 {
     let mesh = boxes::split_box([10; 3], Vec3::splat(100.0));
     let tets = mesh.tets.len();
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
     let body = Body::uniform(mesh, fixed, Material::BRAIN);
-    let mut solver = Tled::new(&body, &Config::default()).expect("a split box is a valid mesh");
+    let config = Config { threads: 1, still_mm: 0.0, ..ingredients.config() };
+    let mut solver = Tled::new(&body, &config).expect("a split box is a valid mesh");
     let loads = Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
     let dt_ms = solver.stable_dt_ms();
     1e3 * median_us(clock, CALLS, |_| _ = solver.step(&loads, dt_ms)) / tets as f64
@@ -107,7 +110,7 @@ mod tests {
     #[test]
     fn parts_that_are_not_wanted_are_not_measured() {
         let usual = Machine::default();
-        let machine = machine(Wanted { bone: true, tissue: false, picture: true }, true);
+        let machine = machine(Wanted { bone: true, tissue: false, picture: true }, true, &Ingredients::default());
         assert_eq!((machine.ns_per_tet_step, machine.ns_per_ray), (usual.ns_per_tet_step, usual.ns_per_ray));
         assert!(machine.us_per_rigid_tick > 0.0 && machine.us_per_rigid_tick != usual.us_per_rigid_tick);
     }

@@ -18,6 +18,7 @@
 
 use super::bone::Slide;
 use crate::error::SessionError;
+use crate::ingredients::Element;
 use crate::run::clock::Clock;
 use std::collections::BTreeMap;
 use trepan_budget::{Scene, Tissue, dt_ms};
@@ -147,16 +148,18 @@ pub struct Brains<'a> {
     shape: &'a Shape,
     choices: Vec<Tissue>,
     meshes: Vec<(usize, TetMesh)>,
+    /// Element of TLED.
+    element: Element,
     /// Damping of all solvers, 1/ms.
     damping: Damping,
 }
 
 impl<'a> Brains<'a> {
-    /// Builds the uniform meshes of a brain.
+    /// Builds the uniform meshes of a brain; TLED runs with that element.
     ///
     /// # Errors
     /// If the mask cannot be meshed.
-    pub fn of(shape: &'a Shape, choices: &[Tissue]) -> Result<Self, SessionError> {
+    pub fn of(shape: &'a Shape, choices: &[Tissue], element: Element) -> Result<Self, SessionError> {
         let mut meshes: Vec<(usize, TetMesh)> = Vec::new();
         for choice in choices.iter().filter(|choice| choice.halvings == 0) {
             if !meshes.iter().any(|(tets, _)| *tets == choice.tets) {
@@ -166,7 +169,7 @@ impl<'a> Brains<'a> {
         let mesh = meshed(shape, TETS[0], None)?;
         let body = Body::uniform(mesh.clone(), fixed_nodes(&mesh), shape.material);
         let damping = Tled::new(&body, &Config::default()).map_err(brain_error)?.damping_per_ms();
-        Ok(Self { shape, choices: choices.to_vec(), meshes, damping: Damping::Rate(damping) })
+        Ok(Self { shape, choices: choices.to_vec(), meshes, element, damping: Damping::Rate(damping) })
     }
 
     /// Creates the solver of a choice.
@@ -174,7 +177,11 @@ impl<'a> Brains<'a> {
         let body = Body::uniform(mesh.clone(), fixed_nodes(mesh), self.shape.material);
         match Method::named(choice.solver) {
             Some(method) => Ok(Box::new(method.build(&body).map_err(brain_error)?)),
-            None => Ok(Box::new(self.tled(&body, Config { still_mm: choice.still_mm as f32, ..Config::default() })?)),
+            None => {
+                let averaged_pressure = self.element == Element::LockingFree;
+                let still_mm = choice.still_mm as f32;
+                Ok(Box::new(self.tled(&body, Config { still_mm, averaged_pressure, ..Config::default() })?))
+            }
         }
     }
 

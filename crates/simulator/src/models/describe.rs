@@ -70,9 +70,7 @@ impl Models {
         tracing::info!("bone: {bone} ({})", self.why.bone);
         tracing::info!("tissue: {tissue} ({})", self.why.tissue);
         tracing::info!("picture: {picture} ({})", self.why.picture);
-        let (all, off) = (self.ingredients(), Ingredients::default());
-        let differs = KEYS.iter().filter(|key| key.usual.is_some() && key.value(&all) != key.value(&off));
-        let differs: Vec<_> = differs.map(|key| format!("{}={}", key.name, key.value(&all))).collect();
+        let differs = self.differing();
         if !differs.is_empty() {
             tracing::info!("ingredients: {}", differs.join(", "));
         }
@@ -109,8 +107,34 @@ impl Models {
                 text += &format!("{}: {what}\n", given.join(", "));
             }
         }
+        text += &self.describe_ingredients();
         let unmet = self.unmet.iter().map(|text| format!("NOT MET: {text}\n"));
         text + &unmet.collect::<String>()
+    }
+
+    /// The ingredients that differ from the default, and what was left out, with the reasons.
+    fn describe_ingredients(&self) -> String {
+        let out: Vec<_> = KEYS
+            .iter()
+            .filter_map(|key| {
+                let why =
+                    key.left_out.filter(|_| key.value(&self.ingredients) == key.value(&Ingredients::default()))?;
+                Some(format!("  {}: {why}\n", key.name))
+            })
+            .collect();
+        let on = self.differing().join(", ");
+        let on = if on.is_empty() { "all as usual".into() } else { on };
+        format!(
+            "ingredients: {on}; left out by the built-in operation (`cargo xtask validate ablation`):\n{}",
+            out.concat()
+        )
+    }
+
+    /// `KEY=VALUE` of the ingredients that differ from the default.
+    fn differing(&self) -> Vec<String> {
+        let (all, off) = (self.ingredients(), Ingredients::default());
+        let differs = KEYS.iter().filter(|key| key.usual.is_some() && key.value(&all) != key.value(&off));
+        differs.map(|key| format!("{}={}", key.name, key.value(&all))).collect()
     }
 
     /// Source of the plan's errors.

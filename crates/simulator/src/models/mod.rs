@@ -22,7 +22,7 @@ mod overrides;
 pub use describe::{ModelSummary, TissueSummary};
 
 use crate::error::SessionError;
-use crate::ingredients::Ingredients;
+use crate::ingredients::{Element, Ingredients};
 use crate::measure::{self, CaseErrors, Parts, Wanted};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
@@ -146,7 +146,7 @@ impl ModelRequest {
         &self,
         facts: &Facts,
         card: impl FnOnce() -> bool,
-        case_errors: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
+        case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, SessionError>,
     ) -> Result<Models, SessionError> {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
@@ -186,10 +186,11 @@ impl ModelRequest {
         facts: &Facts,
         wanted: Wanted,
         device_draws: bool,
-        case_errors: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
+        case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, SessionError>,
     ) -> Result<(Plan, Parts<bool>), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
-        let (machine, mut rows) = (measure::machine(wanted, device_draws), Rows::stored().map_err(internal)?);
+        let (machine, mut rows) =
+            (measure::machine(wanted, device_draws, &self.given.ingredients), Rows::stored().map_err(internal)?);
         let near = |a: f64, all: &mut dyn Iterator<Item = f64>| {
             let off = |b: &f64| (a / b).ln().abs();
             all.min_by(|x, y| off(x).total_cmp(&off(y)))
@@ -216,7 +217,7 @@ impl ModelRequest {
         if !wanted.picture || device_draws {
             asked.picture.clear();
         }
-        let case_errors = case_errors(&scene, &asked)?;
+        let case_errors = case_errors(&scene, &asked, self.given.ingredients.element)?;
         let plan = trepan_budget::plan_with(&machine, &scene, &case_errors.instead(rows)).map_err(internal)?;
         Ok((plan, case_errors.has()))
     }
@@ -345,7 +346,7 @@ mod tests {
     use clap::Parser;
     use trepan_budget::{Bone, Tissue};
 
-    fn unmeasured(_: &Scene, _: &Rows) -> Result<CaseErrors, SessionError> {
+    fn unmeasured(_: &Scene, _: &Rows, _: Element) -> Result<CaseErrors, SessionError> {
         Ok(CaseErrors::default())
     }
 

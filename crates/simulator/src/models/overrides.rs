@@ -67,7 +67,19 @@ impl Overrides {
             words.push(is_given(flag.clone()));
         }
         self.check(given)?;
+        self.leave_out_what_a_rival_lacks();
         Ok(self)
+    }
+
+    /// Sets ingredients of `tled` that a quality chose, not a user, to their default for another
+    /// solver.
+    fn leave_out_what_a_rival_lacks(&mut self) {
+        let Some(_) = self.ingredients.solver.and_then(trepan_soft::Method::named) else { return };
+        let of_tled = KEYS.iter().filter(|key| key.part == Part::Tled);
+        for (key, usual) in of_tled.filter_map(|key| Some((key, key.usual?))) {
+            let set = key.set(&mut self.ingredients, usual);
+            debug_assert_eq!(set, Ok(()), "{}", key.name);
+        }
     }
 
     /// Refuses an ingredient of `tled` for another solver.

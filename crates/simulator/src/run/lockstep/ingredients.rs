@@ -59,7 +59,7 @@ fn setup(line: &str, recording: Option<&Recording>) -> SessionSetup {
     let mut operation = Operation::of(&options, &DeviceName::MOUSE, recording);
     operation.opening_needed = false;
     let request = ModelRequest::of(program, &options, &operation, recording).unwrap();
-    let models = request.settle(&Facts::default(), || false, |_, _| Ok(CaseErrors::default())).unwrap();
+    let models = request.settle(&Facts::default(), || false, |_, _, _| Ok(CaseErrors::default())).unwrap();
     SessionSetup::new(program, (case(), models), operation, false).unwrap()
 }
 

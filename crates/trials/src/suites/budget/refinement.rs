@@ -16,6 +16,7 @@ use super::scene::MACHINE;
 use crate::engine::picture::{Chart, Mark};
 use crate::engine::suite::{Findings, Row};
 use trepan_budget::Tissue;
+use trepan_simulator::Element;
 use trepan_simulator::measure::tissue::{Brains, Fineness, Push};
 
 /// Tetrahedra of the whole brain.
@@ -33,7 +34,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     for &source in scope.pick(&[Source::BuiltIn][..], &[Source::BuiltIn, Source::MadeUp]) {
         let case = Case::of(source, &mut random);
         let unit = Tissue { solver: "tled", tets: TETS[0], halvings: 0, still_mm: 0.0 };
-        let brains = Brains::of(&case.brain, &[unit]).expect("the brain can be filled");
+        let brains = Brains::of(&case.brain, &[unit], Element::Plain).expect("the brain can be filled");
         for n in 0..scope.pick(1, 4) {
             let (situation, _) = super::stretch(&case, &mut random);
             let truth = if scope.quick { Fineness::QUICK } else { Fineness::JUDGE };

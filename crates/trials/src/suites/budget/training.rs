@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, FEATURES, Kind, Picture, PowerLaw, Row, Tissue, write};
 use trepan_simulator::measure::tissue::{self, Brains, Fineness, Push};
 use trepan_simulator::measure::{self, Wanted, bone, picture};
+use trepan_simulator::{Element, Ingredients};
 
 /// Random numbers of training: far from those of the scenes that are judged.
 const SEED: u64 = 0x7472_6169_6e00;
@@ -55,7 +56,7 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
     let case = Case::of(PARTS[part], &mut random);
     let (bones, tissues, pictures) = (bone::choices(), tissue::choices(), picture::choices());
     let brains = (part < WITH_TISSUE && with_tissue)
-        .then(|| Brains::of(&case.brain, &tissues).expect("the brain can be filled"));
+        .then(|| Brains::of(&case.brain, &tissues, Element::Plain).expect("the brain can be filled"));
     let (unit_us, mut observed) = (unit_us(), Observed::default());
     for _ in 0..SCENES {
         let (situation, stretch) = super::stretch(&case, &mut random);
@@ -86,7 +87,8 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
 
 /// A tick as a machine is measured, µs.
 fn unit_us() -> f64 {
-    measure::machine(Wanted { bone: true, tissue: false, picture: false }, false).us_per_rigid_tick
+    let wanted = Wanted { bone: true, tissue: false, picture: false };
+    measure::machine(wanted, false, &Ingredients::default()).us_per_rigid_tick
 }
 
 fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &Brains) -> Seen {

@@ -8,6 +8,7 @@ use trepan_budget::{
     Bone, Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,
     picture_cores, plan_with, tissue_cores,
 };
+use trepan_simulator::Element;
 use trepan_simulator::measure::CaseErrors;
 use trepan_simulator::measure::bone::Stretch;
 use trepan_simulator::measure::picture::View;
@@ -21,7 +22,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
     let (rows, truth) = (stored(quick), if quick { Fineness::QUICK } else { Fineness::JUDGE });
     let case = Case::of(source, random);
     let tissues: Vec<_> = rows.tissue.iter().map(|row| row.what).collect();
-    let brains = Brains::of(&case.brain, &tissues).expect("the brain can be filled");
+    let brains = Brains::of(&case.brain, &tissues, Element::Plain).expect("the brain can be filled");
     for number in 0..scenes {
         let (situation, stretch, push) = scene(&case, &brains, truth, random);
         let name = format!("{} {number}", case.name);
@@ -31,7 +32,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
         let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
         let seen = View::measure_all(&situation.views(&case), &pictures, 1).expect("the views have pixels");
-        let own = CaseErrors::of(&situation.sight(&case), &situation.scene, &rows, 1);
+        let own = CaseErrors::of(&situation.sight(&case), &situation.scene, &rows, Element::Plain, 1);
         note(&name, &situation, &rows, &own, [on_bone, in_tissue, seen], findings);
     }
 }

@@ -42,6 +42,7 @@ pub fn all(scope: Scope) -> Vec<Candidate> {
             ("3000, alike everywhere", "--quality usual --tets 3000 --opening-refinement 0"),
             ("12000, alike everywhere", "--quality usual --tets 12000 --opening-refinement 0"),
             ("24000, alike everywhere", "--quality usual --tets 24000 --opening-refinement 0"),
+            ("shaded force on bone", "--quality usual --set shading=on"),
             ("position based", "--quality usual --solver xpbd"),
             ("masses and springs", "--quality usual --solver mass-spring"),
         ]);
