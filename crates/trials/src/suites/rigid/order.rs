@@ -284,7 +284,7 @@ fn steady_mm() -> f64 {
 }
 
 /// Orders that are known to be missed: scene and error. In a bore nothing falls: nodes are at most
-/// 0.5 mm apart, and discs on the cut are flat.
+/// 0.5 mm apart.
 const GAPS: [(&str, &str); 2] = [("order: bore", "force"), ("order: bore", "depth")];
 
 /// The orders that the recommended method reaches.
