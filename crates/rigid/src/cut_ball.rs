@@ -310,3 +310,28 @@ impl Paid {
 pub(crate) fn covered(depth: f32x8, radius: f32) -> f32x8 {
     (0.5 - 1.0 / (24.0 * radius) + depth).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(share: f32, cosine: f32, covered: f32) -> f32 {
+        let crossed = Crossed { share: f32x8::splat(share), cosine: f32x8::splat(cosine) };
+        crossed.taken(f32x8::splat(covered)).as_array()[3]
+    }
+
+    /// Halves of a node by two half-spaces: apart, crossed at a right angle, and the same. A node
+    /// that one of them fills or leaves out is the other's, under any angle.
+    #[test]
+    fn what_is_taken_of_a_node_depends_on_the_angle_of_its_surfaces() {
+        let is = |found: f32, wanted: f32| assert!((found - wanted).abs() < 1e-6, "{found} of {wanted}");
+        for (cosine, wanted) in [(1.0, 0.0), (0.0, 0.25), (-1.0, 0.5)] {
+            is(taken(0.5, cosine, 0.5), wanted);
+        }
+        for cosine in [-1.0, -0.4, 0.0, 0.7, 1.0] {
+            for (share, covered, wanted) in [(1.0, 0.3, 0.3), (0.3, 1.0, 0.3), (0.0, 0.3, 0.0), (0.3, 0.0, 0.0)] {
+                is(taken(share, cosine, covered), wanted);
+            }
+        }
+    }
+}
