@@ -57,6 +57,8 @@ struct Seen {
 #[derive(Default)]
 pub(crate) struct InReach {
     list: Vec<Seen>,
+    /// Those of them that may touch, seen from another place.
+    touched: Vec<Seen>,
     /// Where the ball sees them from.
     at: Vec3,
     /// Whether its centre is in bone there.
@@ -65,7 +67,7 @@ pub(crate) struct InReach {
 
 impl InReach {
     pub fn with_capacity(count: usize) -> Self {
-        Self { list: Vec::with_capacity(count), ..Self::default() }
+        Self { list: Vec::with_capacity(count), touched: Vec::with_capacity(count), ..Self::default() }
     }
 
     pub fn clear(&mut self) {
@@ -82,11 +84,15 @@ impl InReach {
     }
 
     /// Those that `ball`, its centre not in bone, touches with a tolerance of `most`.
-    pub fn touching(&self, ball: &Ball, at: Vec3, most: f32) -> impl Iterator<Item = (&Disc, Near)> {
+    pub fn touching(&mut self, ball: &Ball, at: Vec3, most: f32) -> impl Iterator<Item = (&Disc, &Near)> {
+        let Self { list, touched, .. } = self;
         let moved = if self.inside { f32::MAX } else { at.distance(self.at) };
-        let may = move |seen: &&Seen| seen.near.distance - moved <= ball.radius_at(&seen.disc) + most;
-        let seen = self.list.iter().filter(may).map(move |seen| (&seen.disc, ball.nearest(&seen.disc, at)));
-        seen.filter(move |(disc, near)| near.distance < ball.radius_at(disc) + most)
+        let may = list.iter().filter(|seen| seen.near.distance - moved <= ball.radius_at(&seen.disc) + most);
+        touched.clear();
+        touched.extend(may);
+        ball.see(touched, at);
+        let touch = touched.iter().filter(move |seen| seen.near.distance < ball.radius_at(&seen.disc) + most);
+        touch.map(|seen| (&seen.disc, &seen.near))
     }
 
     /// Adds a disc that `ball` sees from where it saw the others; false when there is no room.

@@ -40,19 +40,19 @@ use wide::f32x8;
 /// Density differences past this many HU from the isovalue do not bend a normal further.
 const CLAMP_HU: f32 = 1000.0;
 /// How far the rim of a disc may stand out over a surface that bends away, voxels.
-const STAND_OUT: f32 = 0.05;
+pub(crate) const STAND_OUT: f32 = 0.05;
 /// Cosine of the most that a fit may turn the slope's own normal.
 const SAME: f32 = 0.8;
 /// Radius of a disc on the cut, cells.
-const CUT_DISC: f32 = 0.5;
+pub(crate) const CUT_DISC: f32 = 0.5;
 /// Density over the isovalue at which the surface is further than a disc reaches, HU.
 const FAR_HU: f32 = 800.0;
 /// Weight of flatness in the fit of a quadric, beside weights of the densities of about 1.
 const RIDGE: f32 = 1e-4;
 /// Smallest disc, voxels.
-const SMALLEST: f32 = 0.2;
+pub(crate) const SMALLEST: f32 = 0.2;
 /// Largest curvature of a disc, 1/voxel.
-const MAX_CURVATURE: f32 = 0.6;
+pub(crate) const MAX_CURVATURE: f32 = 0.6;
 /// How far a bent disc reaches from its centre, in radii: its rim is up to a quarter of the radius
 /// off the plane.
 pub(crate) const EXTENT: f32 = 1.04;
@@ -90,6 +90,11 @@ pub(crate) struct Bend {
 }
 
 impl Bend {
+    /// With a first principal direction and the principal curvatures, 1/node.
+    pub fn new(along: Vec3, curvatures: [f32; 2]) -> Self {
+        Self { along, curvatures, rise: 0.0 }
+    }
+
     /// Of a surface that rises by `½ (uu a² + 2 uv a b + vv b²)` over its plane of `u` and `v`.
     fn of(u: Vec3, v: Vec3, [uu, uv, vv]: [f32; 3]) -> Self {
         let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));

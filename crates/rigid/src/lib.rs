@@ -48,6 +48,7 @@ mod ball;
 mod burr;
 mod chain;
 mod cut_ball;
+mod cut_discs;
 mod disc;
 mod eight;
 pub mod god_object_sphere;

@@ -12,7 +12,7 @@ const GRAZED: f32 = 500.0;
 /// Widest disc that does not stand out over a cut which ends over two nodes away, cells.
 const WIDEST: f32 = 1.2;
 /// Slope of the cut along an edge that counts as steep, HU a cell.
-const STEEP: f32 = -300.0;
+pub(crate) const STEEP: f32 = -300.0;
 
 /// Where the surface is read from: one or two fields on the cells of a grid, bone where all of
 /// them are over their borders.
@@ -40,6 +40,10 @@ pub(crate) trait Solid {
     /// Cells from one voxel to the next.
     fn voxel(&self) -> i32 {
         1
+    }
+    /// Its nodes, if it has any.
+    fn fine(&self) -> Option<&Fine<'_>> {
+        None
     }
     /// Widest disc, cells.
     fn widest(&self) -> f32 {
@@ -76,6 +80,10 @@ impl Solid for Fine<'_> {
 
     fn voxel(&self) -> i32 {
         self.stride
+    }
+
+    fn fine(&self) -> Option<&Fine<'_>> {
+        Some(self)
     }
 
     fn widest(&self) -> f32 {
@@ -138,7 +146,7 @@ pub(crate) fn crossing<S: Solid>(solid: &S, base: IVec3, local: IVec3, step: IVe
 }
 
 /// Where the cubic of [`cubic`] passes 0.
-fn end_of_bone([a, b, c, d]: [f32; 4]) -> f32 {
+pub(crate) fn end_of_bone([a, b, c, d]: [f32; 4]) -> f32 {
     let [one, two, three] = coefficients([a, b, c, d]);
     let value = |t: f32| b + t * (one + t * (two + t * three));
     let slope = |t: f32| one + t * (2.0 * two + 3.0 * t * three);

@@ -197,6 +197,24 @@ impl Window {
         (v.x | v.y << self.bits | v.z << (2 * self.bits)) as usize
     }
 
+    /// The 27 cells around and at `cell`, x fastest.
+    #[inline]
+    pub fn block(&self, cell: IVec3) -> [i16; 27] {
+        let mask = (1 << self.bits) - 1;
+        let of = |at: i32, axis: u32| [-1, 0, 1].map(|n| (((at + n) & mask) << (axis * self.bits)) as usize);
+        let ([x, y, z], cells) = ([of(cell.x, 0), of(cell.y, 1), of(cell.z, 2)], &self.cells[..1 << (3 * self.bits)]);
+        core::array::from_fn(|n| cells[x[n % 3] | y[n / 3 % 3] | z[n / 9]])
+    }
+
+    /// How far eight values of cells are over the border of bone: as [`over`](Self::over).
+    #[inline]
+    pub fn scaled_eight(&self, values: &[i16; 8]) -> f32x8 {
+        match self.shown {
+            Shown::Cut => (f32::from(self.border) - wide(values)) * (1000.0 / CUT_STEPS),
+            Shown::Density => wide(values) - f32::from(self.border),
+        }
+    }
+
     /// A cell within the window; outside it, some other cell.
     #[inline]
     pub fn at(&self, cell: IVec3) -> i16 {
