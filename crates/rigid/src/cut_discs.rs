@@ -73,8 +73,8 @@ pub(crate) fn ends(fine: &Fine, ways: &[Way; EDGES]) -> Ends {
     Ends { share: is_cut.select(by_cut, by_density).to_array(), by_cut: is_cut.to_bitmask() & 0xFF }
 }
 
-/// The discs on the cut at places `x`, nodes from `base`, on edges that leave the bone: as
-/// [`Disc::of`] shapes them, of at most `radius` nodes.
+/// The shapes of discs on the cut at `x`, nodes from `base`, as [`Disc::of`] finds them; at most
+/// `radius` nodes.
 pub(crate) fn shapes(fine: &Fine, base: IVec3, ways: &[Way; EDGES], x: &[Vec3; EDGES], radius: f32) -> [Disc; EDGES] {
     let mut values = [[[[0i16; EDGES]; 3]; 3]; 3];
     let (mut off, radius) = ([Vec3::ZERO; EDGES], CUT_DISC.min(radius));

@@ -58,7 +58,7 @@ fn method(bone: &Bone) -> Option<Method> {
 pub struct Measurement {
     /// Force error, N.
     pub error_n: f64,
-    /// Median time of a tick, µs.
+    /// Mean time of a tick on the path that takes longest, µs: as a rule while it cuts.
     pub tick_us: f64,
 }
 
@@ -162,17 +162,17 @@ impl<'a> Stretch<'a> {
         path.iter().map(tick).collect()
     }
 
-    /// Forces along a path, N, and the median time of a tick, µs. Removed bone is restored
+    /// Forces along a path, N, and the mean time of a tick, µs. Removed bone is restored
     /// afterwards.
     fn follow(&self, method: &Method, bone: &BoneVolume, path: &[ToolState], cuts: bool) -> (Vec<Vec3>, f64) {
         let mut contact = method.build(&Tool::burr(self.slide.scene.tool_radius_mm as f32));
         contact.reset(path[0].world_from_tool);
-        let (mut out, mut us, clock) = (RigidStep::default(), Vec::with_capacity(path.len()), Clock::start());
+        let (mut out, mut us, clock) = (RigidStep::default(), 0.0, Clock::start());
         let stiffness = self.slide.scene.stiffness as f32;
         let tick = |tool: &ToolState| {
             let began_ms = clock.now_ms();
             contact.step(bone, tool, cuts, 1.0, &mut out);
-            us.push(1e3 * (clock.now_ms() - began_ms));
+            us += 1e3 * (clock.now_ms() - began_ms);
             stiffness * out.manifold.depth_mm * out.manifold.normal
         };
         if cuts {
@@ -182,11 +182,11 @@ impl<'a> Stretch<'a> {
         if cuts {
             bone.undo_stroke();
         }
-        (forces, quantile(&mut us, 0.5))
+        (forces, us / path.len().max(1) as f64)
     }
 
-    /// Measures each choice, in the order given: the worst error of all paths, the tick time of the
-    /// first. Each voxel size is resampled once.
+    /// Measures each choice, in the order given: the worst error and time of all paths. Each voxel
+    /// size is resampled once.
     pub fn measure(&self, choices: &[Bone]) -> Vec<Measurement> {
         let mut grids: Vec<(f64, Option<BoneVolume>)> = Vec::new();
         let mut found = Vec::new();
@@ -204,7 +204,7 @@ impl<'a> Stretch<'a> {
                 };
                 Measurement { error_n: error_n(&forces, &tool_path.truth), tick_us }
             };
-            let worse = |a: Measurement, b: Measurement| Measurement { error_n: a.error_n.max(b.error_n), ..a };
+            let worse = |a: Measurement, b: Measurement| Measurement { error_n: a.error_n.max(b.error_n), tick_us: a.tick_us.max(b.tick_us) };
             found.extend(self.paths.iter().map(along).reduce(worse));
         }
         found
