@@ -42,7 +42,7 @@ const TIMES_MS: [[usize; 3]; 2] = [[200, 200, 300], [300, 500, 500]];
 /// Radii of burrs, mm.
 const BURRS_MM: [f32; 3] = [1.0, 2.0, 4.0];
 /// Edge of a voxel, mm.
-const VOXEL_MM: f32 = 0.6;
+const VOXEL_MM: f32 = 0.5;
 /// Half an edge of the piece of the head that is touched, mm.
 const AROUND_MM: f64 = 18.0;
 /// Forces under this are not felt, N.
