@@ -1,21 +1,21 @@
 //! Text of a plan: the choices, the reasons, and the costs of the neighbours.
 
-use crate::{Choice, Plan};
+use crate::{Choice, Plan, Scene};
 use core::fmt;
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let scene = &self.scene;
         if let Some(bone) = &self.bone {
-            part(f, "bone", bone, scene.force_error_n, "N")?;
+            part(f, scene, "bone", bone, (scene.force_error_n, "N"))?;
         }
         if let Some(tissue) = &self.tissue {
-            part(f, "tissue", tissue, scene.displacement_mm, "mm")?;
+            part(f, scene, "tissue", tissue, (scene.displacement_mm, "mm"))?;
         }
         if let Some((step_ms, edge_mm)) = self.step_and_edge() {
             writeln!(f, "  step {step_ms:.2} ms, edge {edge_mm:.1} mm")?;
         }
-        part(f, "picture", &self.picture, scene.picture_error_percent, "%")?;
+        part(f, scene, "picture", &self.picture, (scene.picture_error_percent, "%"))?;
         let (cores, fixed, threads) = (self.cores(), self.fixed_cores, self.machine.threads);
         writeln!(f, "all: {cores:.2} cores of {threads}, {fixed:.2} of them whatever is chosen")
     }
@@ -23,10 +23,10 @@ impl fmt::Display for Plan {
 
 fn part<T: fmt::Display>(
     f: &mut fmt::Formatter<'_>,
+    scene: &Scene,
     name: &str,
     choice: &Choice<T>,
-    tolerance: f64,
-    unit: &str,
+    (tolerance, unit): (f64, &str),
 ) -> fmt::Result {
     let Choice { what, error, cost, .. } = choice;
     let why = match (choice.in_time, choice.meets_tolerance) {
@@ -35,11 +35,16 @@ fn part<T: fmt::Display>(
         (false, _) => "TOO SLOW even so, the cheapest there is",
     };
     writeln!(f, "{name}: {what}")?;
-    writeln!(f, "  {why}: error {error:.3} {unit} of {tolerance:.3} allowed, {cost:.3} cores")?;
+    write!(f, "  {why}: error {error:.3} {unit} of {tolerance:.3} allowed")?;
+    if let Some(force) = choice.force {
+        write!(f, ", force {:.3} N off of {:.3} allowed", force.error_n, force.allowed_n(scene))?;
+    }
+    writeln!(f, ", {cost:.3} cores")?;
     for (label, neighbour) in [("next better", &choice.better), ("next cheaper", &choice.cheaper)] {
         if let Some(n) = neighbour {
             let late = if n.in_time { "" } else { ", too slow here" };
-            writeln!(f, "  {label}: {}: error {:.3} {unit}, {:.3} cores{late}", n.what, n.error, n.cost)?;
+            let force = n.force.map(|force| format!(", {:.3} N", force.error_n)).unwrap_or_default();
+            writeln!(f, "  {label}: {}: error {:.3} {unit}{force}, {:.3} cores{late}", n.what, n.error, n.cost)?;
         }
     }
     Ok(())

@@ -39,9 +39,11 @@ mod step;
 
 pub use choice::{Choice, Neighbour};
 pub use machine::{Machine, PlanError};
-pub use plan::{Plan, bone_cores, bone_error_n, dt_ms, holds_walls, picture_cores, plan, plan_with, tissue_cores};
+pub use plan::{
+    Plan, bone_cores, bone_error_n, dt_ms, holds_walls, picture_cores, plan, plan_with, tissue_cores, tissue_over,
+};
 pub use power_law::{FEATURES, PowerLaw};
-pub use rows::{Kind, Row, Rows, read, write};
+pub use rows::{Kind, Row, Rows, TissueForce, read, write};
 pub use scene::Scene;
 pub use setup::{Bone, Picture, Quality, Setup, Tissue};
 pub use step::{edge_mm, stable_dt_ms};

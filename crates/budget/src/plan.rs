@@ -3,7 +3,7 @@
 use crate::choice::{Choice, Neighbour, choose};
 use crate::machine::check;
 use crate::step::{edge_mm, stable_dt_ms};
-use crate::{Bone, Machine, Picture, PlanError, Quality, Row, Rows, Scene, Setup, Tissue};
+use crate::{Bone, Machine, Picture, PlanError, Quality, Row, Rows, Scene, Setup, Tissue, TissueForce};
 use core::f64::consts::PI;
 
 /// Fraction of a tick available to the rigid contact; the rest is for device, force model and
@@ -104,9 +104,9 @@ pub fn plan_with(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Plan, 
 fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, PlanError> {
     let judged = rows.bone.iter().filter(|row| holds_walls(&row.what, scene.tool_radius_mm)).map(|row| {
         let cost = bone_cores(machine, scene, row);
-        Neighbour { what: row.what, error: bone_error_n(scene, row), cost, in_time: cost <= TICK_SHARE }
+        Neighbour { what: row.what, error: bone_error_n(scene, row), force: None, cost, in_time: cost <= TICK_SHARE }
     });
-    choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
+    choose(judged, |n| n.error / scene.force_error_n).ok_or(PlanError::NoRows("bone"))
 }
 
 /// Whether a bone model keeps a burr of a radius, mm, on the side of the bone that it came from.
@@ -126,23 +126,30 @@ fn tissue(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Ch
     let judged = rows.tissue.iter().map(|row| {
         let cost = tissue_cores(machine, scene, row);
         let error = row.error.at_most(&scene.tissue_features());
-        Neighbour { what: row.what, error, cost, in_time: cost <= most }
+        Neighbour { what: row.what, error, force: row.force, cost, in_time: cost <= most }
     });
-    choose(judged, scene.displacement_mm).ok_or(PlanError::NoRows("tissue"))
+    choose(judged, |n| tissue_over(scene, n.error, n.force)).ok_or(PlanError::NoRows("tissue"))
 }
 
 fn picture(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Choice<Picture>, PlanError> {
     let judged = rows.picture.iter().map(|row| {
         let cost = picture_cores(machine, scene, row);
         let error = row.error.at_most(&scene.picture_features());
-        Neighbour { what: row.what, error, cost, in_time: cost <= free }
+        Neighbour { what: row.what, error, force: None, cost, in_time: cost <= free }
     });
-    choose(judged, scene.picture_error_percent).ok_or(PlanError::NoRows("picture"))
+    choose(judged, |n| n.error / scene.picture_error_percent).ok_or(PlanError::NoRows("picture"))
 }
 
 /// Bound of the force error, N, met by 95 of 100 ticks.
 pub fn bone_error_n(scene: &Scene, row: &Row<Bone>) -> f64 {
     scene.stiffness * row.error.at_most(&scene.bone_features())
+}
+
+/// The worst of a tissue model's errors over their tolerances: displacement, mm, and force, where
+/// that was measured.
+pub fn tissue_over(scene: &Scene, error_mm: f64, force: Option<TissueForce>) -> f64 {
+    let of_force = force.map_or(0.0, |force| force.error_n / force.allowed_n(scene));
+    of_force.max(error_mm / scene.displacement_mm)
 }
 
 /// Cost of a bone model, cores.
@@ -190,7 +197,7 @@ mod tests {
         Machine { ns_per_tet_step: 20.0, us_per_rigid_tick: 40.0, ns_per_ray: 500.0, threads: 2, device_draws: false };
 
     fn row<T>(what: T, error: f64, cost: f64) -> Row<T> {
-        Row { what, error: PowerLaw::constant(error), cost: PowerLaw::constant(cost) }
+        Row { what, error: PowerLaw::constant(error), cost: PowerLaw::constant(cost), force: None }
     }
 
     fn rows() -> Rows {
@@ -244,6 +251,22 @@ mod tests {
         assert_eq!(tissue.cheaper.map(|n| n.what.tets), Some(10_000));
         assert!(plan.meets_tolerances() && plan.in_time());
         assert_eq!(plan.setup().tissue, tissue.what);
+    }
+
+    /// 10,000 tetrahedra are near enough in displacement at 1.5 mm, but not in force: 0.03 N where
+    /// 0.02 N or a tenth of 0.25 N are allowed. Of a force of 0.4 N they are.
+    #[test]
+    fn force_on_tissue_has_its_own_tolerance() {
+        let taken = |force_n: f64| {
+            let mut rows = rows();
+            let errors = [0.05, 0.03, 0.01];
+            let forces = errors.map(|error_n| Some(TissueForce { error_n, force_n }));
+            rows.tissue.iter_mut().zip(forces).for_each(|(row, force)| row.force = force);
+            plan_with(&MACHINE, &Scene { displacement_mm: 1.5, ..scene() }, &rows).unwrap()
+        };
+        let (weak, strong) = (taken(0.25), taken(0.4));
+        assert_eq!([&weak, &strong].map(|plan| plan.tissue.unwrap().what.tets), [20_000, 10_000]);
+        assert!(strong.to_string().contains("force 0.030 N off of 0.040 allowed"), "{strong}");
     }
 
     #[test]
@@ -320,6 +343,7 @@ mod tests {
             let machine = unhurried(&machine);
             let tighter = Scene {
                 force_error_n: share * scene.force_error_n,
+                tissue_force_n: share * scene.tissue_force_n,
                 displacement_mm: share * scene.displacement_mm,
                 picture_error_percent: share * scene.picture_error_percent,
                 ..scene

@@ -5,7 +5,7 @@
 //! measures them again. A caller's own rows go to [`plan_with`](crate::plan_with).
 
 use crate::power_law::FEATURES;
-use crate::{Bone, Picture, PlanError, PowerLaw, Tissue};
+use crate::{Bone, Picture, PlanError, PowerLaw, Scene, Tissue};
 
 /// Numbers of a power law in a table.
 const LAW: usize = FEATURES + 3;
@@ -22,6 +22,24 @@ pub struct Row<T> {
     /// The unit is a tick; a tetrahedron and step of the expected length, sleeping ones included;
     /// or a pixel of the full picture.
     pub cost: PowerLaw,
+    /// How wrong a tool's force on tissue is; known where the case was measured.
+    pub force: Option<TissueForce>,
+}
+
+/// How wrong a tool's force on tissue is, in one case.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TissueForce {
+    /// Error of the force, N.
+    pub error_n: f64,
+    /// The force, N.
+    pub force_n: f64,
+}
+
+impl TissueForce {
+    /// Error that a scene's tolerances allow, N.
+    pub fn allowed_n(&self, scene: &Scene) -> f64 {
+        scene.tissue_force_n.max(scene.tissue_force_share * self.force_n)
+    }
 }
 
 /// All available choices.
@@ -86,7 +104,7 @@ pub fn read<T: Kind>(table: &'static str) -> Result<Vec<Row<T>>, PlanError> {
         let what = T::read(keys).ok_or_else(|| wrong(line, format!("no choice: {}", keys.join(","))))?;
         let law =
             |from: &[&str]| law(from).ok_or_else(|| wrong(line, format!("not {LAW} numbers: {}", from.join(","))));
-        Ok(Row { what, error: law(&laws[..LAW])?, cost: law(&laws[LAW..])? })
+        Ok(Row { what, error: law(&laws[..LAW])?, cost: law(&laws[LAW..])?, force: None })
     };
     lines.map(row).collect()
 }

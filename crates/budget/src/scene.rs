@@ -10,6 +10,10 @@ pub struct Scene {
     pub force_error_n: f64,
     /// Tolerance of the displacement error, mm, met by 95 of 100 points near the tool.
     pub displacement_mm: f64,
+    /// Tolerances of the force error on tissue, N and share of the force: the greater one counts.
+    pub tissue_force_n: f64,
+    /// See [`tissue_force_n`](Self::tissue_force_n).
+    pub tissue_force_share: f64,
     /// Tolerance of the picture error, root mean square of all colours, percent of white.
     pub picture_error_percent: f64,
     /// Whether the scene contains bone.
@@ -50,12 +54,14 @@ pub struct Scene {
 impl Default for Scene {
     /// Tolerances that a hand or an eye just notices.
     ///
-    /// Force error: 0.1 N. Displacement: what the usual setup just meets in an adult head. Picture:
+    /// Force error: 0.1 N on bone, a tenth on tissue but not under 0.02 N. Displacement: what the usual setup just meets in an adult head. Picture:
     /// its edges are still sharp.
     fn default() -> Self {
         Self {
             force_error_n: 0.1,
             displacement_mm: 0.4,
+            tissue_force_n: 0.02,
+            tissue_force_share: 0.1,
             picture_error_percent: 1.0,
             has_bone: true,
             has_tissue: true,
@@ -78,10 +84,12 @@ impl Default for Scene {
 
 impl Scene {
     /// All fields that must be above 0, by name.
-    pub(crate) fn numbers(&self) -> [(&'static str, f64); 16] {
+    pub(crate) fn numbers(&self) -> [(&'static str, f64); 18] {
         [
             ("scene.force_error_n", self.force_error_n),
             ("scene.displacement_mm", self.displacement_mm),
+            ("scene.tissue_force_n", self.tissue_force_n),
+            ("scene.tissue_force_share", self.tissue_force_share),
             ("scene.picture_error_percent", self.picture_error_percent),
             ("scene.stiffness", self.stiffness),
             ("scene.tool_radius_mm", self.tool_radius_mm),

@@ -216,12 +216,16 @@ pub enum Task {
 /// Error tolerances of a session.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct Tolerances {
-    /// Tolerance of the force error on bone, 95th percentile of the ticks, N [default: 0.4]
+    /// Tolerance of the force error on bone, 95th percentile of the ticks, N [default: 0.1]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub force_error_n: Option<f64>,
     /// Tolerance of the brain's displacement error near the tool, mm [default: 0.4]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub displacement_mm: Option<f64>,
+    /// Tolerance of the force error on tissue, N, or a tenth of the force if that is more
+    /// [default: 0.02]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub tissue_force_n: Option<f64>,
     /// Tolerance of the picture error, percent of white [default: 1]
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     pub picture_error_percent: Option<f64>,
@@ -231,6 +235,7 @@ impl Tolerances {
     /// Refuses numbers out of range.
     pub fn check(&self) -> Result<(), SessionError> {
         within("force-error-n", self.force_error_n.unwrap_or(1.0), 1e-4, 100.0)?;
+        within("tissue-force-n", self.tissue_force_n.unwrap_or(1.0), 1e-4, 100.0)?;
         within("displacement-mm", self.displacement_mm.unwrap_or(1.0), 1e-4, 100.0)?;
         within("picture-error-percent", self.picture_error_percent.unwrap_or(1.0), 1e-3, 100.0)
     }

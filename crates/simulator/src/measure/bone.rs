@@ -204,7 +204,10 @@ impl<'a> Stretch<'a> {
                 };
                 Measurement { error_n: error_n(&forces, &tool_path.truth), tick_us }
             };
-            let worse = |a: Measurement, b: Measurement| Measurement { error_n: a.error_n.max(b.error_n), tick_us: a.tick_us.max(b.tick_us) };
+            let worse = |a: Measurement, b: Measurement| Measurement {
+                error_n: a.error_n.max(b.error_n),
+                tick_us: a.tick_us.max(b.tick_us),
+            };
             found.extend(self.paths.iter().map(along).reduce(worse));
         }
         found

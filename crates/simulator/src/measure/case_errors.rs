@@ -23,19 +23,19 @@
 use super::Parts;
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
-use super::tissue::{Brains, Fineness, LEAST_MM, Push, Shape};
+use super::tissue::{self, Brains, Fineness, LEAST_MM, Push, Shape};
 use crate::error::SessionError;
 use crate::ingredients::Element;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 use std::sync::Arc;
-use trepan_budget::{Bone, Kind, PowerLaw, Row, Rows, Scene, holds_walls};
+use trepan_budget::{Bone, Kind, PowerLaw, Row, Rows, Scene, Tissue, TissueForce, holds_walls};
 use trepan_geometry::Vec3;
 use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.
-const FORM: u32 = 12;
+const FORM: u32 = 13;
 /// Slides along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of a slide, mm.
@@ -68,6 +68,8 @@ pub struct CaseErrors {
     bone: Vec<(Vec<String>, f64)>,
     /// Errors in tissue, mm.
     tissue: Vec<(Vec<String>, f64)>,
+    /// Errors of the force on tissue and that force, N.
+    tissue_force: Vec<(Vec<String>, [f64; 2])>,
     /// Errors in the picture, percent of white.
     picture: Vec<(Vec<String>, f64)>,
 }
@@ -86,7 +88,17 @@ impl CaseErrors {
         } else {
             (others(1), tissue())
         };
-        Self { bone: to_millionths(bone), tissue: to_millionths(tissue), picture: to_millionths(picture) }
+        let errors = tissue.iter().map(|(name, found)| (name.clone(), found.error_mm));
+        let forces = tissue.iter().map(|(name, found)| {
+            let TissueForce { error_n, force_n } = found.force;
+            (name.clone(), [error_n, force_n].map(millionths))
+        });
+        Self {
+            bone: to_millionths(bone),
+            tissue: to_millionths(errors.collect()),
+            tissue_force: forces.collect(),
+            picture: to_millionths(picture),
+        }
     }
 
     /// Lists all inputs of the measurement except the case, for a cache key.
@@ -102,21 +114,31 @@ impl CaseErrors {
     pub fn instead(&self, mut rows: Rows) -> Rows {
         replace(&self.bone, MARGIN[0], &mut rows.bone);
         replace(&self.tissue, MARGIN[1], &mut rows.tissue);
+        for row in &mut rows.tissue {
+            let name = row.what.write();
+            let force = self.tissue_force.iter().find(|(of, _)| *of == name);
+            row.force =
+                force.map(|(_, [error_n, force_n])| TissueForce { error_n: MARGIN[1] * error_n, force_n: *force_n });
+        }
         replace(&self.picture, MARGIN[2], &mut rows.picture);
         rows
     }
 
     /// Whether bone, tissue and picture were measured.
     pub fn has(&self) -> Parts<bool> {
-        let Self { bone, tissue, picture } = self;
+        let Self { bone, tissue, picture, .. } = self;
         Parts { bone: !bone.is_empty(), tissue: !tissue.is_empty(), picture: !picture.is_empty() }
     }
 }
 
 /// Rounds to 1e-6, so that a file reproduces the numbers exactly.
 fn to_millionths(mut found: Vec<(Vec<String>, f64)>) -> Vec<(Vec<String>, f64)> {
-    found.iter_mut().for_each(|(_, error)| *error = (*error * 1e6).round() / 1e6);
+    found.iter_mut().for_each(|(_, error)| *error = millionths(*error));
     found
+}
+
+fn millionths(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
 }
 
 fn names<T: Kind>(rows: &[Row<T>]) -> Vec<Vec<String>> {
@@ -169,7 +191,7 @@ fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)>
     all.map(|(choice, error)| (choice.write(), error)).collect()
 }
 
-fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec<(Vec<String>, f64)> {
+fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec<(Vec<String>, tissue::Measurement)> {
     let choices: Vec<_> =
         rows.tissue.iter().map(|row| row.what).filter(|c| c.solver == "tled" && c.still_mm == 0.0).collect();
     let Some((shape, place)) = sight.brain.as_ref().filter(|_| scene.has_tissue && !choices.is_empty()) else {
@@ -186,7 +208,7 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec
         tracing::warn!("{fault}");
         Vec::new()
     });
-    choices.iter().zip(found).map(|(choice, found)| (choice.write(), found.error_mm)).collect()
+    choices.iter().map(Tissue::write).zip(found).collect()
 }
 
 fn in_picture(sight: &Sight, scene: &Scene, rows: &Rows, threads: usize) -> Vec<(Vec<String>, f64)> {
@@ -266,7 +288,7 @@ mod tests {
     fn a_measured_error_replaces_the_law() {
         let scene = Scene::default();
         let mut rows = Rows::stored().unwrap();
-        let names = |row: &Row<trepan_budget::Tissue>| row.what.write();
+        let names = |row: &Row<Tissue>| row.what.write();
         let tissue = rows.tissue.iter().take(2).map(|row| (names(row), 2.0)).collect();
         let own = CaseErrors { tissue, ..CaseErrors::default() };
         let found = own.instead(rows.clone()).tissue;

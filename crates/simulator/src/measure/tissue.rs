@@ -10,7 +10,8 @@
 //! The ground truth is TLED with averaged nodal pressure and no sleeping elements, on a mesh with a
 //! sixteenth of the edge length under the ball. The error is the distance between the positions of
 //! material points near the opening on both meshes, at the end of push and slide: its 95th
-//! percentile over the points.
+//! percentile over the points. That of the tool's force is taken at the same times; the worse one
+//! counts.
 //!
 //! The cost of TLED is counted: 1 per tetrahedron and step, 0.1 for a sleeping one, times the
 //! expected stable time step for this number of tetrahedra over the mesh's. The cost of the other
@@ -21,7 +22,7 @@ use crate::error::SessionError;
 use crate::ingredients::Element;
 use crate::run::clock::Clock;
 use std::collections::BTreeMap;
-use trepan_budget::{Scene, Tissue, dt_ms};
+use trepan_budget::{Scene, Tissue, TissueForce, dt_ms};
 use trepan_contact::{NodalContact, NodalContacts};
 use trepan_geometry::{Vec3, quantile};
 use trepan_mesh::{Surface, TetMesh, lattice};
@@ -106,6 +107,8 @@ pub fn choices() -> Vec<Tissue> {
 pub struct Measurement {
     /// Error of the displacement, mm.
     pub error_mm: f64,
+    /// Force of the tool and its error, the worse of push and slide.
+    pub force: TissueForce,
     /// Work of a TLED step, as a share of one with all tetrahedra awake; 1 for other solvers.
     pub awake: f64,
     /// Time step, ms.
@@ -239,7 +242,22 @@ pub struct Push {
     slide: Slide,
     normal: Vec3,
     points: Vec<Vec3>,
-    truth: Vec<Vec3>,
+    truth: Pushed,
+}
+
+/// What a push did to the tissue.
+#[derive(Clone, Debug, Default)]
+struct Pushed {
+    /// Displacements of the points at the end of push and slide, mm.
+    moved: Vec<Vec3>,
+    /// Force of the tool at the end of each, N.
+    forces_n: [f64; 2],
+    /// Mean work of a step, as a share of one with all tetrahedra awake.
+    awake: f64,
+    /// Time step, ms.
+    dt_ms: f64,
+    /// Computing time per tetrahedron and step, ns.
+    ns: f64,
 }
 
 impl Push {
@@ -255,9 +273,9 @@ impl Push {
             shape.field.gradient(slide.place + 4.0 * (turn.cos() * a + turn.sin() * b))
         };
         let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
-        let mut push = Self { slide: *slide, normal, points: points(shape, slide.place), truth: Vec::new() };
+        let mut push = Self { slide: *slide, normal, points: points(shape, slide.place), truth: Pushed::default() };
         let mesh = push.refined(shape, truth, 0.5)?;
-        push.truth = push.run(&mesh, &mut brains.tled_with_pressure(&mesh, true)?, LONGEST_MS[0]).0;
+        push.truth = push.run(&mesh, &mut brains.tled_with_pressure(&mesh, true)?, LONGEST_MS[0]);
         Ok(push)
     }
 
@@ -300,8 +318,9 @@ impl Push {
     }
 
     fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Measurement {
-        let (places, awake, dt_ms, ns) = self.run(mesh, solver, longest_ms);
-        Measurement { error_mm: self.error_mm(&places), awake, dt_ms, ns }
+        let found = self.run(mesh, solver, longest_ms);
+        let Pushed { awake, dt_ms, ns, .. } = found;
+        Measurement { error_mm: self.error_mm(&found), force: self.force(&found), awake, dt_ms, ns }
     }
 
     /// Distance of this ground truth from a finer one, 95th percentile over the points, mm.
@@ -311,24 +330,31 @@ impl Push {
 
     /// Largest displacement of a point, mm; 0 if the tool meets fixed tissue or none.
     pub fn moved_mm(&self) -> f64 {
-        self.truth.iter().map(|moved| f64::from(moved.length())).fold(0.0, f64::max)
+        self.truth.moved.iter().map(|moved| f64::from(moved.length())).fold(0.0, f64::max)
     }
 
-    fn error_mm(&self, places: &[Vec3]) -> f64 {
-        let apart = places.iter().zip(&self.truth).map(|(a, b)| f64::from(a.distance(*b)));
+    fn error_mm(&self, found: &Pushed) -> f64 {
+        let apart = found.moved.iter().zip(&self.truth.moved).map(|(a, b)| f64::from(a.distance(*b)));
         quantile(&mut apart.collect::<Vec<_>>(), 0.95)
     }
 
-    /// Runs push and slide. Returns the points' displacements at the end of each, the mean relative
-    /// work of a step, the time step, ms, and the time per tetrahedron and step, ns.
-    fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> (Vec<Vec3>, f64, f64, f64) {
+    fn force(&self, found: &Pushed) -> TissueForce {
+        let both = found.forces_n.into_iter().zip(self.truth.forces_n);
+        let apart = both.map(|(found, truth)| TissueForce { error_n: (found - truth).abs(), force_n: truth });
+        let of = |force: &TissueForce| force.error_n / force.force_n.max(1e-6);
+        apart.max_by(|a, b| of(a).total_cmp(&of(b))).expect("there are two")
+    }
+
+    /// Runs push and slide.
+    fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Pushed {
         let (locations, touch) = (locate(mesh, &self.points), Touch::of(mesh, self.slide.place));
         let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
-        let (mut loads, mut places) = (Loads { contacts: NodalContacts::with_room(), ..Loads::default() }, Vec::new());
+        let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
+        let (mut moved, mut forces_n) = (Vec::new(), [0.0; 2]);
         let (mut work, mut steps, mut step_ms) = (0.0, 0u32, 0.0);
         let ends = [TIMES_MS[0] + TIMES_MS[1], TIMES_MS.iter().sum()];
         let (mut now, mut next) = (0.0f32, 0.0f32);
-        for end in ends {
+        for (end, force_n) in ends.into_iter().zip(&mut forces_n) {
             while now < end {
                 if now >= next {
                     self.press(mesh, &touch, now, &mut loads.contacts);
@@ -340,15 +366,15 @@ impl Push {
                 work += solver.work();
                 (steps, now) = (steps + 1, now + dt_ms);
             }
-            places.extend(
-                locations
-                    .iter()
-                    .zip(&self.points)
-                    .map(|(location, point)| location.place(mesh, solver.seam().positions()) - *point),
+            let positions = solver.seam().positions();
+            let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
+            *force_n = loads.contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum();
+            moved.extend(
+                locations.iter().zip(&self.points).map(|(location, point)| location.place(mesh, positions) - *point),
             );
         }
         let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
-        (places, work / f64::from(steps), dt_ms.into(), ns)
+        Pushed { moved, forces_n, awake: work / f64::from(steps), dt_ms: dt_ms.into(), ns }
     }
 
     /// Point of the slide at a share of its length.

@@ -32,7 +32,7 @@ use crate::stages::haptic_config::BONE_STIFFNESS;
 use crate::tissue_class::TissueClass;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
-use trepan_budget::{Bone, Choice, Plan, Quality, Row, Rows, Scene, Setup};
+use trepan_budget::{Bone, Choice, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
 use trepan_link::Recording;
 use trepan_soft::Material;
@@ -233,6 +233,7 @@ impl ModelRequest {
         Scene {
             force_error_n: self.tolerances.force_error_n.unwrap_or(usual.force_error_n),
             displacement_mm: self.tolerances.displacement_mm.unwrap_or(usual.displacement_mm),
+            tissue_force_n: self.tolerances.tissue_force_n.unwrap_or(usual.tissue_force_n),
             picture_error_percent: self.tolerances.picture_error_percent.unwrap_or(usual.picture_error_percent),
             stiffness: BONE_STIFFNESS.into(),
             press_mm: PRESS_N / f64::from(BONE_STIFFNESS),
@@ -269,9 +270,10 @@ impl ModelRequest {
             words.iter().cloned().chain([reason]).collect::<Vec<_>>().join("; ")
         };
         let words = &self.given.words;
-        let bone = bone.map(|choice| reason(choice, (scene.force_error_n, "N"), measured.bone));
-        let tissue = tissue.map(|choice| reason(choice, (scene.displacement_mm, "mm"), measured.tissue));
-        let picture = picture.map(|choice| reason(choice, (scene.picture_error_percent, "%"), measured.picture));
+        let bone = bone.map(|choice| reason(choice, &scene, (scene.force_error_n, "N"), measured.bone));
+        let tissue = tissue.map(|choice| reason(choice, &scene, (scene.displacement_mm, "mm"), measured.tissue));
+        let picture =
+            picture.map(|choice| reason(choice, &scene, (scene.picture_error_percent, "%"), measured.picture));
         let why = Parts {
             bone: part("bone", &words.bone, bone),
             tissue: part("tissue", &words.tissue, tissue),
@@ -322,15 +324,23 @@ fn view_pixels(picture: [u32; 2]) -> [u32; 2] {
 }
 
 /// Reason for a choice, and whether it misses the tolerance or real time.
-fn reason<T: std::fmt::Display>(choice: &Choice<T>, (tolerance, unit): (f64, &str), measured: bool) -> (String, bool) {
-    let Choice { error, cost, meets_tolerance, in_time, better, cheaper, .. } = choice;
+fn reason<T: std::fmt::Display>(
+    choice: &Choice<T>,
+    scene: &Scene,
+    (tolerance, unit): (f64, &str),
+    measured: bool,
+) -> (String, bool) {
+    let Choice { error, force, cost, meets_tolerance, in_time, better, cheaper, .. } = choice;
     let why = match (in_time, meets_tolerance) {
         (true, true) => "the cheapest within the tolerance",
         (true, false) => "TOLERANCE NOT MET, the most accurate that runs in time",
         (false, _) => "TOO SLOW, the cheapest there is",
     };
     let by = if measured { "in this case" } else { "in cases like this" };
-    let mut text = format!("{why}: error {by} {error:.3} {unit} of {tolerance} allowed, {cost:.3} cores");
+    let of_force =
+        |force: &TissueForce| format!(", force {:.3} N off of {:.3} allowed", force.error_n, force.allowed_n(scene));
+    let force = force.as_ref().map(of_force).unwrap_or_default();
+    let mut text = format!("{why}: error {by} {error:.3} {unit} of {tolerance} allowed{force}, {cost:.3} cores");
     for (label, neighbour) in [("better", better), ("cheaper", cheaper)] {
         if let Some(n) = neighbour {
             let late = if n.in_time { "" } else { ", too slow here" };

@@ -131,7 +131,7 @@ fn rows<T: Kind>(choices: &[T], seen: &[&Seen], covered: f64) -> Vec<Row<T>> {
     };
     let row = |(n, what): (usize, &T)| {
         let error = fit(&|seen| seen.errors[n].max(LEAST))?;
-        Some(Row { what: *what, error, cost: fit(&|seen| seen.costs[n])? })
+        Some(Row { what: *what, error, cost: fit(&|seen| seen.costs[n])?, force: None })
     };
     choices.iter().enumerate().filter_map(row).collect()
 }

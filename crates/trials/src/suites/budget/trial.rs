@@ -5,14 +5,14 @@ use super::scene::{MACHINE, Situation};
 use crate::engine::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{
-    Bone, Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,
-    picture_cores, plan_with, tissue_cores,
+    Bone, Choice, FEATURES, Kind, Quality, Row as Laws, Rows, Setup, TissueForce, bone_cores, bone_error_n,
+    holds_walls, picture_cores, plan_with, tissue_cores, tissue_over,
 };
 use trepan_simulator::Element;
 use trepan_simulator::measure::CaseErrors;
 use trepan_simulator::measure::bone::Stretch;
 use trepan_simulator::measure::picture::View;
-use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Push};
+use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Measurement, Push};
 
 /// Tetrahedra that a quick run has at most.
 const QUICK_TETS: usize = 8_000;
@@ -29,12 +29,20 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
         let bones: Vec<_> = rows.bone.iter().map(|row| row.what).collect();
         let on_bone = stretch.measure(&bones).iter().map(|found| found.error_n).collect();
         let in_tissue = push.measure(&brains).expect("the brain is sound");
-        let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
         let seen = View::measure_all(&situation.views(&case), &pictures, 1).expect("the views have pixels");
         let own = CaseErrors::of(&situation.sight(&case), &situation.scene, &rows, Element::Plain, 1);
-        note(&name, &situation, &rows, &own, [on_bone, in_tissue, seen], findings);
+        note(&name, &situation, &rows, &own, Found { on_bone, in_tissue, seen }, findings);
     }
+}
+
+/// Measured errors of all choices in a scene.
+struct Found {
+    /// Of the force, N.
+    on_bone: Vec<f64>,
+    in_tissue: Vec<Measurement>,
+    /// Of the picture, percent of white.
+    seen: Vec<f64>,
 }
 
 /// A scene with bone to touch and a brain that moves under the push.
@@ -63,16 +71,9 @@ fn stored(quick: bool) -> Rows {
 
 /// Rows of one scene: for each kind what the plan chose, what presets would have done and what was
 /// cheapest.
-fn note(
-    name: &str,
-    situation: &Situation,
-    rows: &Rows,
-    own: &CaseErrors,
-    errors: [Vec<f64>; 3],
-    findings: &mut Findings,
-) {
+fn note(name: &str, situation: &Situation, rows: &Rows, own: &CaseErrors, found: Found, findings: &mut Findings) {
     let scene = &situation.scene;
-    let [on_bone, in_tissue, seen] = errors;
+    let Found { on_bone, in_tissue, seen } = found;
     let holds_walls = |(row, _): &(Laws<Bone>, f64)| holds_walls(&row.what, scene.tool_radius_mm);
     let (holding, on_bone): (Vec<_>, Vec<_>) = rows.bone.iter().copied().zip(on_bone).filter(holds_walls).unzip();
     let rows = &Rows { bone: holding, ..rows.clone() };
@@ -81,17 +82,42 @@ fn note(
     let (bone, tissue, picture) =
         (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"), plan.picture);
     let of = |kind, tolerance, features| Of { scene: format!("{name}, {kind}"), kind, tolerance, features };
-    let judged = rows.bone.iter().zip(on_bone).map(|(row, e)| (row.what, e, bone_cores(&MACHINE, scene, row)));
-    let said = Said::of(&bone, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
-    of("bone", scene.force_error_n, scene.bone_features()).note(judged.collect(), said, |setup| setup.bone, findings);
-    let judged = rows.tissue.iter().zip(in_tissue).map(|(row, e)| (row.what, e, tissue_cores(&MACHINE, scene, row)));
+    let all = rows.bone.iter().zip(on_bone).map(|(row, error)| {
+        judged(row.what, error, None, error / scene.force_error_n, bone_cores(&MACHINE, scene, row))
+    });
+    let said =
+        Said::of(&bone, bone.error / scene.force_error_n, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
+    of("bone", scene.force_error_n, scene.bone_features()).note(all.collect(), said, |setup| setup.bone, findings);
+    let all = rows.tissue.iter().zip(in_tissue).map(|(row, found)| {
+        let over = tissue_over(scene, found.error_mm, Some(found.force));
+        judged(row.what, found.error_mm, Some(found.force), over, tissue_cores(&MACHINE, scene, row))
+    });
     let features = scene.tissue_features();
-    let said = Said::of(&tissue, &rows.tissue, &looked_at.tissue, |row| row.error.at_most(&features));
-    of("tissue", scene.displacement_mm, features).note(judged.collect(), said, |setup| setup.tissue, findings);
-    let judged = rows.picture.iter().zip(seen).map(|(row, e)| (row.what, e, picture_cores(&MACHINE, scene, row)));
+    let over = tissue_over(scene, tissue.error, tissue.force);
+    let said = Said::of(&tissue, over, &rows.tissue, &looked_at.tissue, |row| row.error.at_most(&features));
+    of("tissue", scene.displacement_mm, features).note(all.collect(), said, |setup| setup.tissue, findings);
+    let all = rows.picture.iter().zip(seen).map(|(row, error)| {
+        judged(row.what, error, None, error / scene.picture_error_percent, picture_cores(&MACHINE, scene, row))
+    });
     let features = scene.picture_features();
-    let said = Said::of(&picture, &rows.picture, &looked_at.picture, |row| row.error.at_most(&features));
-    of("picture", scene.picture_error_percent, features).note(judged.collect(), said, |setup| setup.picture, findings);
+    let over = picture.error / scene.picture_error_percent;
+    let said = Said::of(&picture, over, &rows.picture, &looked_at.picture, |row| row.error.at_most(&features));
+    of("picture", scene.picture_error_percent, features).note(all.collect(), said, |setup| setup.picture, findings);
+}
+
+/// A choice as it was found to be.
+#[derive(Clone, Copy)]
+struct Judged<T> {
+    what: T,
+    error: f64,
+    force: Option<TissueForce>,
+    /// The worst of its errors over their tolerances.
+    over: f64,
+    cost: f64,
+}
+
+fn judged<T>(what: T, error: f64, force: Option<TissueForce>, over: f64, cost: f64) -> Judged<T> {
+    Judged { what, error, force, over, cost }
 }
 
 /// A kind of choice in a scene.
@@ -105,35 +131,35 @@ struct Of {
 /// What the plan said, and what it believed of every choice; `None` of those that it left out.
 struct Said<T> {
     what: T,
-    bound: f64,
+    /// The worst of its bounds over their tolerances.
+    over: f64,
     meets: bool,
     believed: Vec<Option<f64>>,
 }
 
 impl<T: Kind + PartialEq> Said<T> {
-    fn of(choice: &Choice<T>, rows: &[Laws<T>], looked_at: &[Laws<T>], error: impl Fn(&Laws<T>) -> f64) -> Self {
+    fn of(
+        choice: &Choice<T>,
+        over: f64,
+        rows: &[Laws<T>],
+        looked_at: &[Laws<T>],
+        error: impl Fn(&Laws<T>) -> f64,
+    ) -> Self {
         let believed = |row: &Laws<T>| looked_at.iter().find(|seen| seen.what == row.what).map(&error);
-        Self {
-            what: choice.what,
-            bound: choice.error,
-            meets: choice.meets_tolerance,
-            believed: rows.iter().map(believed).collect(),
-        }
+        Self { what: choice.what, over, meets: choice.meets_tolerance, believed: rows.iter().map(believed).collect() }
     }
 }
 
 impl Of {
     fn note<T: Kind + Display + PartialEq>(
         &self,
-        judged: Vec<(T, f64, f64)>,
+        all: Vec<Judged<T>>,
         said: Said<T>,
         of_setup: impl Fn(Setup) -> T,
         findings: &mut Findings,
     ) {
-        let all: Vec<_> =
-            judged.iter().map(|&(what, error, cost)| Neighbour { what, error, cost, in_time: true }).collect();
         let of = |what: T| all.iter().find(|n| n.what == what);
-        let meeting = all.iter().filter(|n| n.error <= self.tolerance);
+        let meeting = all.iter().filter(|n| n.over <= 1.0);
         let cheapest = meeting.min_by(|a, b| a.cost.total_cmp(&b.cost));
         let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(said.what, &of_setup))));
         for (name, taken) in chosen.chain([("cheapest", cheapest)]) {
@@ -145,17 +171,22 @@ impl Of {
             auto.config.insert("errors".into(), all.iter().map(|n| four(n.error)).collect::<Vec<_>>().into());
             auto.config.insert("features".into(), self.features.map(four).to_vec().into());
             auto.config.insert("believed".into(), said.believed.iter().map(|e| e.map(four)).collect::<Vec<_>>().into());
-            auto.metrics.insert("bound_over_tolerance".into(), said.bound / self.tolerance);
+            auto.metrics.insert("bound_over_tolerance".into(), said.over);
             auto.metrics.insert("says_met_count".into(), f64::from(u8::from(said.meets)));
         }
     }
 
-    fn row<T: Display>(&self, name: &str, taken: &Neighbour<T>) -> Row {
-        Row::new(&self.scene, name)
+    fn row<T: Display>(&self, name: &str, taken: &Judged<T>) -> Row {
+        let row = Row::new(&self.scene, name)
             .with("kind", self.kind)
             .with("choice", taken.what.to_string())
             .with("tolerance", self.tolerance)
-            .metric("error_over_tolerance", taken.error / self.tolerance)
-            .metric("cost_cores", taken.cost)
+            .metric("error_over_tolerance", taken.over)
+            .metric("own_error_over_tolerance", taken.error / self.tolerance)
+            .metric("cost_cores", taken.cost);
+        match taken.force {
+            Some(TissueForce { error_n, force_n }) => row.metric("force_error_n", error_n).metric("force_n", force_n),
+            None => row,
+        }
     }
 }
