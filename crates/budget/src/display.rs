@@ -13,7 +13,8 @@ impl fmt::Display for Plan {
             part(f, scene, "tissue", tissue, (scene.displacement_mm, "mm"))?;
         }
         if let Some((step_ms, edge_mm)) = self.step_and_edge() {
-            writeln!(f, "  step {step_ms:.2} ms, edge {edge_mm:.1} mm")?;
+            let threads = self.solver_threads;
+            writeln!(f, "  step {step_ms:.2} ms, edge {edge_mm:.1} mm, {threads} thread(s)")?;
         }
         part(f, scene, "picture", &self.picture, (scene.picture_error_percent, "%"))?;
         let (cores, fixed, threads) = (self.cores(), self.fixed_cores, self.machine.threads);

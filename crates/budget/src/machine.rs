@@ -14,6 +14,8 @@ pub struct Machine {
     pub ns_per_ray: f64,
     /// Threads that may run at the same time.
     pub threads: u32,
+    /// Threads of the solver where they are given; else the plan takes as many as it needs.
+    pub solver_threads: Option<u32>,
     /// Whether a graphics device renders instead of the processor.
     pub device_draws: bool,
 }
@@ -21,7 +23,14 @@ pub struct Machine {
 impl Default for Machine {
     /// Two threads of a server processor of 2023, without a graphics device.
     fn default() -> Self {
-        Self { ns_per_tet_step: 13.0, us_per_rigid_tick: 6.0, ns_per_ray: 450.0, threads: 2, device_draws: false }
+        Self {
+            ns_per_tet_step: 13.0,
+            us_per_rigid_tick: 6.0,
+            ns_per_ray: 450.0,
+            threads: 2,
+            solver_threads: None,
+            device_draws: false,
+        }
     }
 }
 

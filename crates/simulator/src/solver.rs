@@ -109,7 +109,7 @@ impl Ingredients {
                 Relaxation::Off => trepan_tled::Relaxation::NONE,
                 Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
             },
-            threads: self.threads,
+            threads: self.threads.unwrap_or(1),
             ..Config::default()
         }
     }
@@ -205,7 +205,7 @@ mod tests {
         let (usual, ran) = pressed(&plain);
         assert_eq!((ran.name, ran.device, ran.remarks().len()), ("tled", SolverDevice::Cpu, 0));
         assert!(usual[0] > 0.5 && usual[1] > 0.01, "{usual:?}");
-        assert_eq!(pressed(&Ingredients { threads: 2, ..plain.clone() }).0, usual, "threads change no bit");
+        assert_eq!(pressed(&Ingredients { threads: Some(2), ..plain.clone() }).0, usual, "threads change no bit");
         let softer = [
             Ingredients { element: Element::LockingFree, ..plain.clone() },
             Ingredients { relaxation: Relaxation::Prony, ..plain.clone() },

@@ -74,13 +74,12 @@ impl Plan {
         within(self.hole(), self.hole_mm) || self.flap_mm > 0.0 && within(self.site.entry, self.flap_mm + HALF_CUT_MM)
     }
 
-    /// Marks the voxels of a skull that are planned to be removed.
-    pub fn of(&self, skull: &VoxelVolume<i16>, isovalue: i16) -> Vec<bool> {
+    /// The voxels of a skull that are planned to be removed, in their order.
+    pub fn of(&self, skull: &VoxelVolume<i16>, isovalue: i16) -> Vec<usize> {
         let [nx, ny, _] = skull.dims;
-        let planned = |(at, hu): (usize, &i16)| {
-            *hu >= isovalue && self.takes(skull.centre_of([at % nx, at / nx % ny, at / (nx * ny)]).as_vec3())
-        };
-        skull.data.iter().enumerate().map(planned).collect()
+        let place = |at: usize| skull.centre_of([at % nx, at / nx % ny, at / (nx * ny)]).as_vec3();
+        let bone = skull.data.iter().enumerate().filter(|(_, hu)| **hu >= isovalue);
+        bone.map(|(at, _)| at).filter(|at| self.takes(place(*at))).collect()
     }
 }
 
@@ -132,7 +131,7 @@ mod tests {
             assert!((rim.bone_mm - 6.1).abs() < 1.2, "{rim:?}");
             assert!(((rim.outer - site.entry).reject_from(outward).length() - 15.0).abs() < 1e-3);
         }
-        let planned = plan.of(&bone.snapshot(), 400).iter().filter(|planned| **planned).count() as f32;
+        let planned = plan.of(&bone.snapshot(), 400).len() as f32;
         assert!((planned / (std::f32::consts::PI * 16.2f32.powi(2) * 6.1) - 1.0).abs() < 0.06, "{planned}");
         assert!(plan.search(&bone).is_some());
         let hole = Plan::new(Some(&bone), site, 3.0, 0.0).unwrap();

@@ -206,11 +206,11 @@ pub const KEYS: &[Key] = &[
         name: "threads",
         values: || "1 to 64".into(),
         about: "threads of the solver on the processor; the forces are the same for any number",
-        usual: Some("1"),
+        usual: None,
         compared: || vec!["2".into()],
         effect: |_| Effect::Cost,
-        get: |i| Some(i.threads.to_string()),
-        set: |i, text| count(text, 1, 64).map(|threads| i.threads = threads),
+        get: |i| i.threads.map(|threads| threads.to_string()),
+        set: |i, text| count(text, 1, 64).map(|threads| i.threads = Some(threads)),
         ..Key::of(Part::Tled)
     },
     Key {

@@ -46,7 +46,7 @@ pub struct Ingredients {
     /// Where the solver runs.
     pub device: SolverDevice,
     /// Threads of the solver on the processor.
-    pub threads: usize,
+    pub threads: Option<usize>,
     /// Fluid pressure on the brain's surface and in the ventricles, mmHg.
     pub surface_pressure_mmhg: f32,
     /// Search for the tool's points inside the tissue.
@@ -100,7 +100,7 @@ impl Default for Ingredients {
             laws: [Law::NeoHookean; TissueClass::ALL.len()],
             relaxation: Relaxation::Off,
             device: SolverDevice::Cpu,
-            threads: 1,
+            threads: None,
             surface_pressure_mmhg: 0.0,
             search: trepan_deformable::Method::RECOMMENDED,
             friction: 0.0,

@@ -12,6 +12,7 @@
 //! - Picture: each choice is drawn from the first camera and from three others around it,
 //!   against every ray.
 //!
+//! Choices that another beats by a tenth in both error and cost, by the power laws, are not measured.
 //! The hand and the camera will move elsewhere, so measured errors get a safety factor. A measured
 //! error replaces the power law of its choice; choices that were not measured are left out.
 //!
@@ -29,13 +30,16 @@ use crate::ingredients::Element;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 use std::sync::Arc;
-use trepan_budget::{Bone, Kind, PowerLaw, Row, Rows, Scene, Tissue, TissueForce, holds_walls};
+use trepan_budget::{
+    Bone, Kind, Machine, Picture, PowerLaw, Row, Rows, Scene, Tissue, TissueForce, bone_cores, bone_error_n,
+    holds_walls, picture_cores, tissue_cores,
+};
 use trepan_geometry::Vec3;
 use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.
-const FORM: u32 = 13;
+const FORM: u32 = 14;
 /// Slides along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of a slide, mm.
@@ -162,15 +166,26 @@ fn replace<T: Kind>(found: &[(Vec<String>, f64)], margin: f64, rows: &mut Vec<Ro
     }
 }
 
+/// By how much another choice must be better in both error and cost for one not to be measured.
+const BEATEN: f64 = 0.9;
+
+/// Of rows with their error and cost by the laws: those that may be worth taking.
+fn front<T: Kind>(rows: Vec<(&Row<T>, [f64; 2])>) -> Vec<T> {
+    let beats = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a < BEATEN * c && b < BEATEN * d;
+    let is_beaten = |of: [f64; 2]| rows.iter().any(|(_, other)| beats(*other, of));
+    rows.iter().filter(|(_, of)| !is_beaten(*of)).map(|(row, _)| row.what).collect()
+}
+
 fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)> {
-    let mut choices: Vec<_> =
-        rows.bone.iter().map(|row| row.what).filter(|what| holds_walls(what, scene.tool_radius_mm)).collect();
+    let mut holding: Vec<_> = rows.bone.iter().filter(|row| holds_walls(&row.what, scene.tool_radius_mm)).collect();
     // Errors of other methods, such as `thesis`, differ between paths: unless a method is given,
     // only the recommended one is measured.
-    let recommended = |choice: &Bone| choice.method == Method::RECOMMENDED.name();
-    if choices.iter().any(recommended) {
-        choices.retain(recommended);
+    let recommended = |row: &&Row<Bone>| row.what.method == Method::RECOMMENDED.name();
+    if holding.iter().any(recommended) {
+        holding.retain(recommended);
     }
+    let of = |row: &Row<Bone>| [bone_error_n(scene, row), bone_cores(&Machine::default(), scene, row)];
+    let choices = front(holding.into_iter().map(|row| (row, of(row))).collect());
     let Some((skull, _)) = sight.skull.as_ref().filter(|_| scene.has_bone && !choices.is_empty()) else {
         return Vec::new();
     };
@@ -192,8 +207,10 @@ fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)>
 }
 
 fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec<(Vec<String>, tissue::Measurement)> {
-    let choices: Vec<_> =
-        rows.tissue.iter().map(|row| row.what).filter(|c| c.solver == "tled" && c.still_mm == 0.0).collect();
+    let ours = rows.tissue.iter().filter(|row| row.what.solver == "tled" && row.what.still_mm == 0.0);
+    let features = scene.tissue_features();
+    let of = |row: &Row<Tissue>| [row.error.at_most(&features), tissue_cores(&Machine::default(), scene, row)];
+    let choices = front(ours.map(|row| (row, of(row))).collect());
     let Some((shape, place)) = sight.brain.as_ref().filter(|_| scene.has_tissue && !choices.is_empty()) else {
         return Vec::new();
     };
@@ -212,7 +229,9 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec
 }
 
 fn in_picture(sight: &Sight, scene: &Scene, rows: &Rows, threads: usize) -> Vec<(Vec<String>, f64)> {
-    let choices: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
+    let features = scene.picture_features();
+    let of = |row: &Row<Picture>| [row.error.at_most(&features), picture_cores(&Machine::default(), scene, row)];
+    let choices = front(rows.picture.iter().map(|row| (row, of(row))).collect());
     let Some((_, bone)) = sight.skull.as_ref().filter(|_| !choices.is_empty()) else { return Vec::new() };
     let (a, b) = sight.eye.any_orthonormal_pair();
     let around = (0..CAMERAS.0).map(|n| TAU * n as f32 / CAMERAS.0 as f32).map(|turn| turn.cos() * a + turn.sin() * b);

@@ -35,6 +35,7 @@ pub fn machine(wanted: Wanted, device_draws: bool, ingredients: &Ingredients) ->
         us_per_rigid_tick: if wanted.bone { us_per_rigid_tick(&clock) } else { usual.us_per_rigid_tick },
         ns_per_ray: if wanted.picture && !device_draws { ns_per_ray(&clock) } else { usual.ns_per_ray },
         threads,
+        solver_threads: None,
         device_draws,
     }
 }

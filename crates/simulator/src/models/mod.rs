@@ -32,7 +32,7 @@ use crate::stages::haptic_config::BONE_STIFFNESS;
 use crate::tissue_class::TissueClass;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
-use trepan_budget::{Bone, Choice, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
+use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
 use trepan_link::Recording;
 use trepan_soft::Material;
@@ -189,8 +189,9 @@ impl ModelRequest {
         case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, SessionError>,
     ) -> Result<(Plan, Parts<bool>), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
-        let (machine, mut rows) =
-            (measure::machine(wanted, device_draws, &self.given.ingredients), Rows::stored().map_err(internal)?);
+        let solver_threads = self.given.ingredients.threads.map(|threads| threads as u32);
+        let machine = measure::machine(wanted, device_draws, &self.given.ingredients);
+        let (machine, mut rows) = (Machine { solver_threads, ..machine }, Rows::stored().map_err(internal)?);
         let near = |a: f64, all: &mut dyn Iterator<Item = f64>| {
             let off = |b: &f64| (a / b).ln().abs();
             all.min_by(|x, y| off(x).total_cmp(&off(y)))
@@ -292,6 +293,7 @@ impl Models {
             rigid_points: Some(bone.points),
             solver: Some(tissue.solver),
             still_mm: Some(tissue.still_mm),
+            threads: self.ingredients.threads.or(self.plan.as_ref().map(|plan| plan.solver_threads as usize)),
             ..self.ingredients.clone()
         }
     }
@@ -460,7 +462,7 @@ mod tests {
         recording.header.config.extend(was.entries(&was.ingredients()));
         assert_eq!(settle("", Some(&recording)).ingredients(), was.ingredients());
         let other = settle("--set threads=1,shaft=off", Some(&recording)).ingredients();
-        let expected = Ingredients { threads: 1, rigid: Some("god-object-sphere"), ..was.ingredients() };
+        let expected = Ingredients { threads: Some(1), rigid: Some("god-object-sphere"), ..was.ingredients() };
         assert_eq!(other, expected);
         assert_eq!(settle("--quality usual", Some(&recording)).ingredients(), plain, "a preset overrides a recording");
         recording.header.config.insert("solver".into(), "fastest".into());

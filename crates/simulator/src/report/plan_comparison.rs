@@ -17,6 +17,7 @@
 //! (1993), as in A. A. Taha, A. Hanbury, BMC Medical Imaging 15 (2015).
 
 use crate::case::plan::Plan;
+use glam::IVec3;
 use serde::Serialize;
 use trepan_geometry::Vec3;
 use trepan_volume::{BoneVolume, VoxelVolume};
@@ -39,14 +40,14 @@ pub struct PlanComparison {
 impl PlanComparison {
     /// Compares the bone `before` and now with the plan; `None` if the plan contains no bone.
     pub fn of(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<Self> {
-        let now = bone.snapshot();
         let isovalue = bone.isovalue();
         let planned = plan.of(before, isovalue);
-        let taken: Vec<bool> =
-            before.data.iter().zip(&now.data).map(|(was, is)| *was >= isovalue && *is < isovalue).collect();
-        let count = |set: &[bool]| set.iter().filter(|is| **is).count() as f64;
-        let both = planned.iter().zip(&taken).filter(|(p, t)| **p && **t).count() as f64;
-        let (of_plan, gone) = (count(&planned), count(&taken));
+        let [nx, ny, _] = before.dims;
+        let voxel = |at: usize| IVec3::from([at % nx, at / nx % ny, at / (nx * ny)].map(|n| n as i32));
+        let was_bone = before.data.iter().enumerate().filter(|(_, hu)| **hu >= isovalue).map(|(at, _)| at);
+        let taken: Vec<usize> = was_bone.filter(|at| !bone.is_bone(voxel(*at))).collect();
+        let both = planned.iter().filter(|at| taken.binary_search(at).is_ok()).count() as f64;
+        let (of_plan, gone) = (planned.len() as f64, taken.len() as f64);
         let mm3 = f64::from(bone.voxel_mm3());
         (of_plan > 0.0).then(|| Self {
             planned_mm3: of_plan * mm3,
@@ -58,16 +59,20 @@ impl PlanComparison {
     }
 }
 
-/// Returns the centres of the voxels of a set with a neighbour outside it, world mm.
-fn border(of: &VoxelVolume<i16>, set: &[bool]) -> Vec<Vec3> {
+/// Returns the centres of the voxels of a set, in their order, with a neighbour outside it, world mm.
+fn border(of: &VoxelVolume<i16>, set: &[usize]) -> Vec<Vec3> {
     let [nx, ny, nz] = of.dims;
     let inner = |[x, y, z]: [usize; 3]| x > 0 && y > 0 && z > 0 && x + 1 < nx && y + 1 < ny && z + 1 < nz;
     let strides = [1, nx, nx * ny];
     let on_border = |at: usize, place: [usize; 3]| {
-        !inner(place) || strides.iter().any(|stride| !set[at - stride] || !set[at + stride])
+        !inner(place)
+            || strides
+                .iter()
+                .flat_map(|stride| [at - stride, at + stride])
+                .any(|beside| set.binary_search(&beside).is_err())
     };
     let place = |at: usize| [at % nx, at / nx % ny, at / (nx * ny)];
-    let at = (0..set.len()).filter(|&at| set[at] && on_border(at, place(at)));
+    let at = set.iter().copied().filter(|&at| on_border(at, place(at)));
     at.map(|at| of.centre_of(place(at)).as_vec3()).collect()
 }
 
@@ -84,7 +89,6 @@ fn surface_95(a: &[Vec3], b: &[Vec3]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::IVec3;
     use trepan_haptics::script::Site;
     use trepan_volume::AIR_HU;
 

@@ -15,8 +15,14 @@ const MOVED: f32 = 0.25;
 
 /// Machine for which choices are priced: enough threads that time never decides, so that accuracy
 /// does.
-pub const MACHINE: Machine =
-    Machine { ns_per_tet_step: 13.0, us_per_rigid_tick: 6.0, ns_per_ray: 450.0, threads: 64, device_draws: false };
+pub const MACHINE: Machine = Machine {
+    ns_per_tet_step: 13.0,
+    us_per_rigid_tick: 6.0,
+    ns_per_ray: 450.0,
+    threads: 64,
+    solver_threads: None,
+    device_draws: false,
+};
 
 /// What is done where.
 #[derive(Clone, Debug)]
