@@ -301,8 +301,9 @@ mod tests {
         assert_eq!(plan.setup().tissue, tissue.what);
     }
 
-    /// 10,000 tetrahedra are near enough in displacement at 1.5 mm, but not in force: 0.03 N where
-    /// 0.02 N or a tenth of 0.25 N are allowed. Of a force of 0.4 N they are.
+    /// 10,000 tetrahedra are near enough in displacement, but 0.03 N off in force.
+    ///
+    /// A tenth of 0.25 N are 0.025 N, of 0.4 N 0.04 N.
     #[test]
     fn force_on_tissue_has_its_own_tolerance() {
         let taken = |force_n: f64| {
@@ -328,8 +329,10 @@ mod tests {
         assert!(!hopeless.in_time() && hopeless.to_string().contains("TOO SLOW"));
     }
 
+    /// Three threads are 2.6 times as fast as one.
+    ///
     /// 20 000 tetrahedra at 60 ns take 1.77 cores on one thread: with headroom 1.2 that is 2.13
-    /// seconds a second, and three threads are 2.6 times as fast as one.
+    /// seconds a second.
     #[test]
     fn a_mesh_that_one_thread_cannot_step_gets_more() {
         let machine = Machine { ns_per_tet_step: 60.0, threads: 4, ..MACHINE };

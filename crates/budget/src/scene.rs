@@ -54,8 +54,8 @@ pub struct Scene {
 impl Default for Scene {
     /// Tolerances that a hand or an eye just notices.
     ///
-    /// Force error: 0.1 N on bone, a tenth on tissue but not under 0.02 N. Displacement: what the usual setup just meets in an adult head. Picture:
-    /// its edges are still sharp.
+    /// Force error: 0.1 N on bone; a tenth on tissue, but not under 0.02 N. Displacement: what the
+    /// usual setup just meets in an adult head. Picture: its edges are still sharp.
     fn default() -> Self {
         Self {
             force_error_n: 0.1,

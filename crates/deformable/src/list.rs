@@ -2,7 +2,6 @@
 
 use crate::method::{Descriptor, Method, Response};
 use crate::response::{Ball, Respond, Spring};
-#[cfg(feature = "parry")]
 use crate::rivals::parry_tree;
 use crate::rivals::printed::Faces;
 use crate::rivals::{aabb, brute, hashed_grid, hybrid_tree, k_dop, kd_tree};
@@ -22,7 +21,6 @@ const METHODS: &[Descriptor] = &[
     k_dop::METHOD,
     obb::METHOD,
     hybrid_tree::METHOD,
-    #[cfg(feature = "parry")]
     parry_tree::METHOD,
     thesis::METHOD,
     walk::METHOD,

@@ -22,7 +22,6 @@ fn all(mesh: &TetMesh, cell_mm: f32, points: usize) -> Vec<(&'static str, Box<dy
         ("k-DOP tree", Box::new(VolumeTree::<KDop>::new(&mesh.positions, &mesh.tets))),
         ("turned box tree", Box::new(VolumeTree::<Obb>::new(&mesh.positions, &mesh.tets))),
         ("hybrid tree", Box::new(HybridTree::new(&mesh.positions, &mesh.tets))),
-        #[cfg(feature = "parry")]
         ("parry", Box::new(ParryTree::new(&mesh.positions, &mesh.tets))),
     ]
 }

@@ -12,7 +12,6 @@ pub mod k_dop;
 pub mod kd_tree;
 pub mod obb;
 pub mod octree;
-#[cfg(feature = "parry")]
 pub mod parry_tree;
 pub(crate) mod printed;
 pub mod sphere;
@@ -27,7 +26,6 @@ pub use k_dop::KDop;
 pub use kd_tree::KdTree;
 pub use obb::Obb;
 pub use octree::Octree;
-#[cfg(feature = "parry")]
 pub use parry_tree::ParryTree;
 pub use sphere::Sphere;
 pub use uniform_grid::UniformGrid;

@@ -13,7 +13,7 @@ use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
 use crate::case::identity;
-use crate::case::opening::{Opening, REFERENCE_MM, bone_of, eye};
+use crate::case::opening::{Inside, Opening, REFERENCE_MM, bone_of, eye};
 use crate::case::space::Space;
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs};
@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
 use trepan_haptics::script::Site;
-use trepan_volume::{DistanceField, VoxelVolume, bone_isovalue, overlap, skull_only};
+use trepan_volume::{VoxelVolume, bone_isovalue, overlap, skull_only};
 
 /// Opens a case: from the cache if it was built before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
@@ -49,7 +49,7 @@ pub(super) fn open_by(
 ) -> Result<Case, SessionError> {
     let mut pending = PendingCase::of(program, inputs, requested, cache)?;
     let recipe = choose(&mut pending)?;
-    let PendingCase { facts, notes, key, images, mut stages, .. } = pending;
+    let PendingCase { facts, notes, key, images, opening, mut stages, .. } = pending;
     let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
     let hashes = identity::images(inputs, requested)?;
@@ -59,7 +59,7 @@ pub(super) fn open_by(
         return Ok(Case { images: hashes, ..case });
     }
     let images = images.map_or_else(|| read(inputs, requested, &mut stages), Ok)?;
-    let mut case = build(program, inputs, images, &recipe, &mut stages)?;
+    let mut case = build(program, inputs, (images, opening), &recipe, &mut stages)?;
     (case.name, case.hash, case.images) = (name, hash, hashes);
     stages.next("caching the case");
     // The facts are cached only now: images from which no case can be built leave nothing.
@@ -94,6 +94,8 @@ pub(super) struct PendingCase<'a> {
     cache: &'a Cache,
     key: String,
     images: Option<Images>,
+    /// Where a skull is opened, on voxels of 1 mm, if that was looked for.
+    opening: Option<Opening>,
     /// Progress of the import.
     pub stages: ImportStages,
 }
@@ -115,7 +117,7 @@ impl<'a> PendingCase<'a> {
                 (CachedFacts { facts: facts_of(&images), notes: images.notes.clone() }, Some(images))
             }
         };
-        Ok(Self { facts, notes, program, inputs, requested, cache, key, images, stages })
+        Ok(Self { facts, notes, program, inputs, requested, cache, key, images, opening: None, stages })
     }
 
     /// Caches the facts unless they are cached already.
@@ -138,22 +140,31 @@ impl<'a> PendingCase<'a> {
         self.stages.next("measuring model errors in this case");
         let sight =
             self.images.as_ref().map(|images| sight(self.program, images, self.requested, scene)).transpose()?;
+        let (opening, sight) = sight.flatten().unzip();
+        // Other tissues may change what counts as brain.
+        self.opening = opening.filter(|_| self.inputs.tissues.is_empty() && self.program.has_bone());
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let errors = sight
-            .flatten()
-            .map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, element, threads));
+        let errors =
+            sight.map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, element, threads));
         store(&errors, self.cache, &key, ERRORS);
         Ok(errors)
     }
 }
 
-/// Skull, brain and first view at the opening, to measure errors on; `None` if no opening is found.
-fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> Result<Option<Sight>, SessionError> {
+/// The opening on voxels of 1 mm, and skull, brain and first view there, to measure errors on;
+/// `None` if no opening is found.
+fn sight(
+    program: Program,
+    images: &Images,
+    recipe: &Recipe,
+    scene: &Scene,
+) -> Result<Option<(Opening, Sight)>, SessionError> {
     let classes = images.mask.as_ref().map(cropped).transpose()?;
+    let inside = classes.as_ref().map(Inside::of);
     let of_bone = |ct: &VoxelVolume<i16>| {
         let drawn = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
         let bone = bone_of(&drawn, images.isovalue_hu)?;
-        let opening = Opening::of_patient(&bone, classes.as_ref(), recipe.opening)?;
+        let opening = Opening::of_patient(&bone, inside.as_ref(), recipe.opening)?;
         let mut skull = Skull { ct: ct.clone(), isovalue: images.isovalue_hu };
         skull_only(&mut skull.ct, skull.isovalue);
         Ok::<_, SessionError>((opening, (skull, Arc::new(bone))))
@@ -161,13 +172,14 @@ fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> R
     let with_bone = images.ct.as_ref().filter(|_| program.has_bone()).map(of_bone).transpose()?;
     let (opening, skull) = match with_bone {
         Some((opening, skull)) => (Some(opening), Some(skull)),
-        None => (classes.as_ref().and_then(Opening::on_bare_brain), None),
+        None => (inside.as_ref().and_then(Opening::on_bare_brain), None),
     };
-    let brain = classes.map(|mask| Shape { field: DistanceField::of_mask(&mask), mask, material: scene.material });
+    let brain = classes.zip(inside);
+    let brain = brain.map(|(mask, inside)| Shape { field: inside.field, mask, material: scene.material });
     Ok(opening.map(|opening| {
         let site = Site::from(opening);
         let brain = brain.map(|shape| (shape, opening.brain()));
-        Sight { skull, entry: site.entry, outward: -site.inward, eye: eye(&site), brain }
+        (opening, Sight { skull, entry: site.entry, outward: -site.inward, eye: eye(&site), brain })
     }))
 }
 
@@ -256,7 +268,7 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
 fn build(
     program: Program,
     inputs: &Inputs,
-    images: Images,
+    (images, known): (Images, Option<Opening>),
     recipe: &Recipe,
     stages: &mut ImportStages,
 ) -> Result<Case, SessionError> {
@@ -265,14 +277,18 @@ fn build(
     let skull = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
     stages.next("planning the opening");
     let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
-    let on_skull = |(ct, skull)| Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe);
+    let on_skull = |(ct, skull)| match known {
+        Some(opening) => opening.on(&bone_of(skull, isovalue_hu)?, classes.is_some()),
+        None => Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe),
+    };
     let opening = match ct.as_ref().zip(skull.as_ref()).map(on_skull).transpose() {
         // A program that does not drill needs no opening.
         Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
         found => found?,
     };
     stages.next("meshing the brain");
-    let place = opening.or_else(|| classes.as_ref().and_then(Opening::on_bare_brain)).map(|opening| opening.brain());
+    let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
+    let place = opening.or_else(bare).map(|opening| opening.brain());
     let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, place, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }

@@ -328,7 +328,7 @@ const BY_QUALITY: &str = "by --quality";
 
 impl Ingredients {
     /// Ingredients of a quality.
-    pub(crate) fn of(quality: Quality) -> Self {
+    pub fn of(quality: Quality) -> Self {
         let mut made = Self::default();
         for (key, text) in KEYS.iter().filter_map(|key| Some((key, key.in_quality(quality)?))) {
             let set = key.set(&mut made, text);

@@ -29,7 +29,7 @@ const POINTS: [usize; 3] = [211, 466, 932];
 /// Voxel edge on which a path is laid out, mm.
 const FINE_MM: f32 = 0.25;
 /// Ticks of pressing in and of sliding.
-const TICKS: [usize; 2] = [120, 240];
+const TICKS: [usize; 2] = [60, 120];
 /// Largest depth where bone rises into the path, as a multiple of the pressed depth.
 const RIDGE: f64 = 1.5;
 /// Depth of the cut, mm, and its feed, mm/ms, as of a scripted hand.

@@ -21,6 +21,8 @@ use super::bone::Slide;
 use crate::error::SessionError;
 use crate::ingredients::Element;
 use crate::run::clock::Clock;
+use parry3d::query::PointQueryWithLocation;
+use parry3d::shape::TriMesh;
 use std::collections::BTreeMap;
 use trepan_budget::{Scene, Tissue, TissueForce, dt_ms};
 use trepan_contact::{NodalContact, NodalContacts};
@@ -275,7 +277,7 @@ impl Push {
         let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
         let mut push = Self { slide: *slide, normal, points: points(shape, slide.place), truth: Pushed::default() };
         let mesh = push.refined(shape, truth, 0.5)?;
-        push.truth = push.run(&mesh, &mut brains.tled_with_pressure(&mesh, true)?, LONGEST_MS[0]);
+        push.truth = push.run(&mesh, &mut brains.tled_with_pressure(&mesh, true)?, LONGEST_MS[0])?;
         Ok(push)
     }
 
@@ -297,7 +299,7 @@ impl Push {
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
         let mesh = self.refined(brains.shape, fineness, 0.0)?;
-        Ok(self.found(&mesh, &mut brains.tled_with_pressure(&mesh, averaged_pressure)?, LONGEST_MS[0]))
+        self.found(&mesh, &mut brains.tled_with_pressure(&mesh, averaged_pressure)?, LONGEST_MS[0])
     }
 
     /// Measures every choice, in the order of `brains`.
@@ -312,15 +314,15 @@ impl Push {
             let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
             let mesh = refined.as_ref().or_else(alike).ok_or_else(|| brain_error("a mesh is missing"))?;
             let longest_ms = LONGEST_MS[usize::from(choice.solver == "corotational")];
-            Ok(self.found(mesh, &mut *brains.solver(choice, mesh)?, longest_ms))
+            self.found(mesh, &mut *brains.solver(choice, mesh)?, longest_ms)
         };
         brains.choices.iter().map(one).collect()
     }
 
-    fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Measurement {
-        let found = self.run(mesh, solver, longest_ms);
+    fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Result<Measurement, SessionError> {
+        let found = self.run(mesh, solver, longest_ms)?;
         let Pushed { awake, dt_ms, ns, .. } = found;
-        Measurement { error_mm: self.error_mm(&found), force: self.force(&found), awake, dt_ms, ns }
+        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), awake, dt_ms, ns })
     }
 
     /// Distance of this ground truth from a finer one, 95th percentile over the points, mm.
@@ -346,8 +348,8 @@ impl Push {
     }
 
     /// Runs push and slide.
-    fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Pushed {
-        let (locations, touch) = (locate(mesh, &self.points), Touch::of(mesh, self.slide.place));
+    fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Result<Pushed, SessionError> {
+        let (locations, touch) = (locate(mesh, &self.points), Touch::of(mesh, self.slide.place)?);
         let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
         let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
         let (mut moved, mut forces_n) = (Vec::new(), [0.0; 2]);
@@ -374,7 +376,7 @@ impl Push {
             );
         }
         let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
-        Pushed { moved, forces_n, awake: work / f64::from(steps), dt_ms: dt_ms.into(), ns }
+        Ok(Pushed { moved, forces_n, awake: work / f64::from(steps), dt_ms: dt_ms.into(), ns })
     }
 
     /// Point of the slide at a share of its length.
@@ -396,9 +398,7 @@ impl Push {
             // Sunflower points: evenly distributed over a disc.
             let far = ((n as f32 + 0.5) / PLACES as f32).sqrt() * WIDTH * radius;
             let turn = n as f32 * 2.399_963;
-            let Some((triangle, nodes)) = touch.under(mesh, middle + far * (turn.cos() * a + turn.sin() * b)) else {
-                continue;
-            };
+            let (triangle, nodes) = touch.under(middle + far * (turn.cos() * a + turn.sin() * b));
             let (spring, deep, places) = pressed.entry(triangle).or_default();
             nodes.into_iter().for_each(|(node, weight)| spring.add(node, weight));
             *deep += depth - (radius - (radius * radius - far * far).sqrt());
@@ -433,39 +433,23 @@ fn points(shape: &Shape, place: Vec3) -> Vec<Vec3> {
     all.filter(|p| p.distance(place) <= reach && shape.field.sample(*p) < -0.5).collect()
 }
 
-/// Triangles near the opening.
-struct Touch(Vec<[u32; 3]>);
+/// The brain's surface at rest near the opening.
+struct Touch(TriMesh);
 
 impl Touch {
-    fn of(mesh: &TetMesh, place: Vec3) -> Self {
+    fn of(mesh: &TetMesh, place: Vec3) -> Result<Self, SessionError> {
         let near = |t: &[u32; 3]| t.iter().any(|&n| mesh.positions[n as usize].distance(place) < 40.0);
-        Self(Surface::of(mesh).triangles.into_iter().filter(near).collect())
+        let triangles: Vec<[u32; 3]> = Surface::of(mesh).triangles.into_iter().filter(near).collect();
+        TriMesh::new(mesh.positions.clone(), triangles).map(Self).map_err(brain_error)
     }
 
     /// Nearest triangle to a point, and the weights of its corners there.
-    fn under(&self, mesh: &TetMesh, point: Vec3) -> Option<(usize, [(u32, f32); 3])> {
-        let corners = |t: &[u32; 3]| t.map(|n| mesh.positions[n as usize]);
-        let off = |w: &[f32; 3], t: &[u32; 3]| {
-            let at: Vec3 = corners(t).iter().zip(w).map(|(c, w)| *c * *w).sum();
-            at.distance_squared(point)
-        };
-        let all = self.0.iter().enumerate().map(|(at, t)| (at, t, nearest(point, corners(t))));
-        let (at, t, w) = all.min_by(|(_, t, w), (_, u, v)| off(w, t).total_cmp(&off(v, u)))?;
-        Some((at, [0, 1, 2].map(|corner| (t[corner], w[corner]))))
+    fn under(&self, point: Vec3) -> (usize, [(u32, f32); 3]) {
+        let (_, (triangle, location)) = self.0.project_local_point_and_get_location(point, true);
+        let weights = location.barycentric_coordinates().unwrap_or([1.0, 0.0, 0.0]);
+        let nodes = self.0.indices()[triangle as usize];
+        (triangle as usize, [0, 1, 2].map(|corner| (nodes[corner], weights[corner])))
     }
-}
-
-/// Barycentric weights of about the nearest point of a triangle to `p`: its projection to the
-/// plane, clamped to the triangle.
-fn nearest(p: Vec3, [a, b, c]: [Vec3; 3]) -> [f32; 3] {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let (d, e, f) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
-    let (g, h) = (ab.dot(ap), ac.dot(ap));
-    let whole = (d * f - e * e).max(f32::MIN_POSITIVE);
-    let (v, w) = ((f * g - e * h) / whole, (d * h - e * g) / whole);
-    let cut = [1.0 - v - w, v, w].map(|x| x.max(0.0));
-    let sum: f32 = cut.iter().sum();
-    cut.map(|x| x / sum)
 }
 
 /// Location of a point in a mesh: a tetrahedron and barycentric weights.
@@ -520,9 +504,13 @@ mod tests {
     }
 
     #[test]
-    fn a_projection_outside_the_triangle_is_clamped_to_it() {
-        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
-        assert_eq!(nearest(Vec3::new(0.25, 0.25, 3.0), triangle), [0.5, 0.25, 0.25]);
-        assert_eq!(nearest(Vec3::new(-1.0, -1.0, 0.0), triangle), [1.0, 0.0, 0.0]);
+    fn what_is_under_the_tool_is_the_nearest_point_of_the_surface() {
+        let mesh = trepan_soft::boxes::split_box([3, 3, 3], Vec3::splat(30.0));
+        let touch = Touch::of(&mesh, Vec3::splat(15.0)).unwrap();
+        for (point, nearest) in [([12.0, 17.0, 33.0], [12.0, 17.0, 30.0]), ([-4.0, 31.0, 8.0], [0.0, 30.0, 8.0])] {
+            let (_, nodes) = touch.under(Vec3::from(point));
+            let found: Vec3 = nodes.iter().map(|(node, weight)| *weight * mesh.positions[*node as usize]).sum();
+            assert!(found.distance(Vec3::from(nearest)) < 1e-4, "{found}");
+        }
     }
 }

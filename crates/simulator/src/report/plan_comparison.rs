@@ -59,7 +59,8 @@ impl PlanComparison {
     }
 }
 
-/// Returns the centres of the voxels of a set, in their order, with a neighbour outside it, world mm.
+/// Returns the centres of the voxels of a set that have a neighbour outside it, world mm. The set
+/// is in the voxels' order.
 fn border(of: &VoxelVolume<i16>, set: &[usize]) -> Vec<Vec3> {
     let [nx, ny, nz] = of.dims;
     let inner = |[x, y, z]: [usize; 3]| x > 0 && y > 0 && z > 0 && x + 1 < nx && y + 1 < ny && z + 1 < nz;

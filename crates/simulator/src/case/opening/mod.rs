@@ -71,6 +71,21 @@ fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), Ses
     )))
 }
 
+/// The inside of a brain.
+pub struct Inside {
+    /// Distance to its surface, mm, negative inside.
+    pub field: DistanceField,
+    /// Centre of its bounding box.
+    pub middle: Vec3,
+}
+
+impl Inside {
+    /// Of the nonzero voxels.
+    pub fn of(classes: &VoxelVolume<u8>) -> Self {
+        Self { field: DistanceField::of_mask(classes), middle: middle(classes) }
+    }
+}
+
 impl Opening {
     /// Plans the opening from a CT and measures it on the session's skull. The place does not
     /// depend on that skull's voxels.
@@ -82,7 +97,8 @@ impl Opening {
         recipe: &Recipe,
     ) -> Result<Self, SessionError> {
         let reference = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
-        let opening = Self::of_patient(&bone_of(&reference, isovalue_hu)?, brain, recipe.opening)?;
+        let inside = brain.map(Inside::of);
+        let opening = Self::of_patient(&bone_of(&reference, isovalue_hu)?, inside.as_ref(), recipe.opening)?;
         opening.on(&bone_of(skull, isovalue_hu)?, brain.is_some())
     }
 
@@ -91,12 +107,11 @@ impl Opening {
     /// the best one.
     pub fn of_patient(
         reference: &BoneVolume,
-        brain: Option<&VoxelVolume<u8>>,
+        brain: Option<&Inside>,
         requested: Option<[f32; 3]>,
     ) -> Result<Self, SessionError> {
-        let brain = brain.map(|classes| (DistanceField::of_mask(classes), middle(classes)));
-        let centre = brain.as_ref().map_or(reference.bounds().centre(), |brain| brain.1);
-        let head = Surroundings { bone: reference, brain: brain.as_ref().map(|brain| &brain.0), centre };
+        let centre = brain.map_or(reference.bounds().centre(), |brain| brain.middle);
+        let head = Surroundings { bone: reference, brain: brain.map(|brain| &brain.field), centre };
         let site = match requested {
             Some(requested) => head.towards((Vec3::from(requested) - centre).normalize_or_zero()).ok_or_else(|| {
                 let what = if brain.is_some() { "bone and then brain" } else { "a wall of bone up to 30 mm thick" };
@@ -131,8 +146,8 @@ impl Opening {
     }
 
     /// Finds a place to probe a brain without a skull.
-    pub fn on_bare_brain(classes: &VoxelVolume<u8>) -> Option<Self> {
-        bare_brain(&DistanceField::of_mask(classes), middle(classes)).map(Self::from)
+    pub fn on_bare_brain(brain: &Inside) -> Option<Self> {
+        bare_brain(&brain.field, brain.middle).map(Self::from)
     }
 
     /// Point on the brain's surface below the entry.

@@ -33,7 +33,7 @@ fn opened(
     mask: Option<&VoxelVolume<u8>>,
     requested: Option<[f32; 3]>,
 ) -> Result<Opening, SessionError> {
-    Opening::of_patient(&BoneVolume::new(ct, 400).unwrap(), mask, requested)
+    Opening::of_patient(&BoneVolume::new(ct, 400).unwrap(), mask.map(Inside::of).as_ref(), requested)
 }
 
 #[test]

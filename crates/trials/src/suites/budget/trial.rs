@@ -8,11 +8,11 @@ use trepan_budget::{
     Bone, Choice, FEATURES, Kind, Quality, Row as Laws, Rows, Setup, TissueForce, bone_cores, bone_error_n,
     holds_walls, picture_cores, plan_with, tissue_cores, tissue_over,
 };
-use trepan_simulator::Element;
 use trepan_simulator::measure::CaseErrors;
 use trepan_simulator::measure::bone::Stretch;
 use trepan_simulator::measure::picture::View;
 use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Measurement, Push};
+use trepan_simulator::{Element, Ingredients};
 
 /// Tetrahedra that a quick run has at most.
 const QUICK_TETS: usize = 8_000;
@@ -22,7 +22,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
     let (rows, truth) = (stored(quick), if quick { Fineness::QUICK } else { Fineness::JUDGE });
     let case = Case::of(source, random);
     let tissues: Vec<_> = rows.tissue.iter().map(|row| row.what).collect();
-    let brains = Brains::of(&case.brain, &tissues, Element::Plain).expect("the brain can be filled");
+    let brains = Brains::of(&case.brain, &tissues, element()).expect("the brain can be filled");
     for number in 0..scenes {
         let (situation, stretch, push) = scene(&case, &brains, truth, random);
         let name = format!("{} {number}", case.name);
@@ -31,9 +31,14 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
         let in_tissue = push.measure(&brains).expect("the brain is sound");
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
         let seen = View::measure_all(&situation.views(&case), &pictures, 1).expect("the views have pixels");
-        let own = CaseErrors::of(&situation.sight(&case), &situation.scene, &rows, Element::Plain, 1);
+        let own = CaseErrors::of(&situation.sight(&case), &situation.scene, &rows, element(), 1);
         note(&name, &situation, &rows, &own, Found { on_bone, in_tissue, seen }, findings);
     }
+}
+
+/// The element of a session without flags.
+fn element() -> Element {
+    Ingredients::of(Quality::Auto).element
 }
 
 /// Measured errors of all choices in a scene.

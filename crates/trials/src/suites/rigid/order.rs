@@ -4,9 +4,9 @@
 //! # Theory
 //! An error `e = C h^p` on voxels of h, h/2 and h/4 gives the order p, the slope of ln e over ln h
 //! by least squares. The density is the distance to the closed form, in voxels, times a slope:
-//! there is no blur that could shrink with the voxel, but for the scanned ball. All that is left is the method's own error,
-//! that of the interpolation between voxels, which is of order 2, and that of whole HU: 1/1600
-//! voxel.
+//! there is no blur that could shrink with the voxel, but for the scanned ball. All that is left
+//! is the method's own error, that of the interpolation between voxels, which is of order 2, and
+//! that of whole HU: 1/1600 voxel.
 //!
 //! A burr fed at a steady speed settles where its law takes a cylinder of its width at that speed:
 //! a closed form for the depth. Its bore is a cylinder in which a smaller ball is pressed against
@@ -91,10 +91,11 @@ fn noise(place: DVec3) -> f64 {
     (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
 }
 
-/// Half the step of the density at a scanned edge, HU; standard deviation of the blur, voxels (full
-/// width at half maximum of 1.25), and of the noise, HU.
+/// Half the step of the density at a scanned edge, HU.
 const EDGE_HU: f64 = 1000.0;
+/// Standard deviation of a scanner's blur, voxels: full width at half maximum of 1.25.
 const BLUR_VOXELS: f64 = 0.53;
+/// That of its noise, HU.
 const NOISE_HU: f64 = 20.0;
 
 const BALL: Form = Form {
