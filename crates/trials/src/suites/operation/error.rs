@@ -1,6 +1,7 @@
 //! How far one run of the operation is from the finest one.
 
 use crate::suites::scripted::{FELT_N, PLACE_MM, Ride, surfaces};
+use trepan_budget::{Scene, TissueForce};
 use trepan_geometry::quantile;
 
 /// What differs.
@@ -10,6 +11,8 @@ pub struct Errors {
     pub tissue_rms_n: f64,
     /// The same: what 95 of 100 ticks stay under.
     pub tissue_p95_n: f64,
+    /// The same over what the default tolerances allow of the force at each tick.
+    pub tissue_over: f64,
     /// Error of the brain's surface at the opening, mm, while the probe is in the hand. It is the
     /// distance from where the finest run shows it to the nearest place of this run's brain.
     pub shown_mean_mm: f64,
@@ -30,11 +33,15 @@ impl Errors {
     /// Of a run from the finest one along the same path.
     pub fn between(ride: &Ride, truth: &Ride) -> Self {
         let on_tissue = |tick: &usize| truth.probing[*tick] && !ride.on_bone[*tick] && !truth.on_bone[*tick];
-        let apart_n = |tick: usize| {
+        let scene = Scene::default();
+        let apart = |tick: usize| {
             let (a, b) = (ride.forces[tick], truth.forces[tick]);
-            (a.length() > FELT_N || b.length() > FELT_N).then(|| f64::from(a.distance(b)))
+            let force = TissueForce { error_n: a.distance(b).into(), force_n: b.length().into() };
+            (a.length() > FELT_N || b.length() > FELT_N).then_some(force)
         };
-        let mut tissue: Vec<f64> = (0..truth.forces.len()).filter(on_tissue).filter_map(apart_n).collect();
+        let felt: Vec<TissueForce> = (0..truth.forces.len()).filter(on_tissue).filter_map(apart).collect();
+        let mut tissue: Vec<f64> = felt.iter().map(|force| force.error_n).collect();
+        let mut over: Vec<f64> = felt.iter().map(|force| force.error_n / force.allowed_n(&scene)).collect();
         let (mut rest, mut shown) = surfaces(ride, truth);
         let both = ride.removed.iter().zip(&truth.removed);
         let count = |wanted: fn(bool, bool) -> bool| both.clone().filter(|(a, b)| wanted(**a, **b)).count() as f64;
@@ -42,6 +49,7 @@ impl Errors {
         Self {
             tissue_rms_n: rms(&tissue),
             tissue_p95_n: quantile(&mut tissue, 0.95),
+            tissue_over: quantile(&mut over, 0.95),
             shown_mean_mm: shown.iter().sum::<f64>() / shown.len() as f64,
             shown_p95_mm: quantile(&mut shown, 0.95),
             rest_p95_mm: quantile(&mut rest, 0.95),
@@ -52,10 +60,11 @@ impl Errors {
     }
 
     /// By their names with units.
-    pub fn named(&self) -> [(&'static str, f64); 8] {
+    pub fn named(&self) -> [(&'static str, f64); 9] {
         [
             ("tissue_force_error_rms_n", self.tissue_rms_n),
             ("tissue_force_error_p95_n", self.tissue_p95_n),
+            ("tissue_force_error_over_tolerance", self.tissue_over),
             ("shown_error_mean_mm", self.shown_mean_mm),
             ("shown_error_p95_mm", self.shown_p95_mm),
             ("rest_error_p95_mm", self.rest_p95_mm),
