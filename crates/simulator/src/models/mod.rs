@@ -400,6 +400,13 @@ mod tests {
             models.why.bone.contains("--spacing-mm 0.7 is given; ") && models.why.bone.contains(" N of 0.1 allowed")
         );
         assert_eq!(models.why.picture, "as usual", "no picture is drawn");
+        assert_eq!(models.ingredients().threads, Some(plan.solver_threads as usize), "what is planned runs");
+        let given =
+            request("--set threads=3 --frames-per-second 0", None).settle(&FACTS, || false, unmeasured).unwrap();
+        assert_eq!(
+            (given.plan.as_ref().map(|plan| plan.solver_threads), given.ingredients().threads),
+            (Some(3), Some(3))
+        );
         let models =
             request("--rigid exposed-faces --frames-per-second 0", None).settle(&FACTS, || false, unmeasured).unwrap();
         let usual = Quality::Usual.preset().unwrap();
