@@ -2,8 +2,9 @@
 //!
 //! # Theory
 //! The exact distance to the label's surface ([`DistanceField`]), positive inside; a Gaussian of
-//! width σ then removes detail that a lattice of spacing a ≫ σ would alias. On a sheared grid the
-//! zero set remains correct, the gradient does not; only the zero set is used here.
+//! width σ then removes detail that a lattice of spacing a ≫ σ would alias, and the steps of the
+//! voxels, which no scanned surface has: σ is at least 0.75 voxels. On a sheared grid the zero set
+//! remains correct, the gradient does not; only the zero set is used here.
 //!
 //! # Practice
 //! Only the padded box of the label is stored: labels at the grid's border are closed there. 4
@@ -12,6 +13,9 @@
 use super::blur::blur;
 use glam::{DAffine3, DVec3};
 use trepan_volume::{DistanceField, VoxelVolume};
+
+/// Least width of the Gaussian, voxels.
+const STEPS: f64 = 0.75;
 
 /// The box of a label in its volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,14 +73,15 @@ impl Field {
     /// up to `most_mm`.
     pub(super) fn of(labels: &VoxelVolume<u16>, block: &Block, most_mm: f64, inside: impl Fn(u16) -> bool) -> Self {
         let spacing_mm = labels.spacing_mm();
-        let pad = (most_mm / spacing_mm).to_array().map(|sigma| 2 + (3.0 * sigma).ceil() as usize);
+        let pad = (most_mm / spacing_mm).to_array().map(|sigma| 2 + (3.0 * sigma.max(STEPS)).ceil() as usize);
         let mask = padded(labels, block, pad, inside);
         let values = DistanceField::of_mask(&mask).values().data.iter().map(|d| -d).collect();
         Self { dims: mask.dims, spacing_mm, values, voxel_from_world: mask.world_from_voxel.inverse() }
     }
 
+    /// Smooths with a Gaussian of `sigma_mm`, at least of [`STEPS`].
     pub(super) fn smooth(&mut self, sigma_mm: f64) {
-        blur(&mut self.values, self.dims, (sigma_mm / self.spacing_mm).to_array());
+        blur(&mut self.values, self.dims, (sigma_mm / self.spacing_mm).max(DVec3::splat(STEPS)).to_array());
     }
 
     /// Whether the padded box contains a point.

@@ -42,8 +42,9 @@ use trepan_volume::VoxelVolume;
 pub struct Config {
     /// Requested number of tetrahedra, 100 to 20 million; met within 10 %. More is finer.
     pub target_tets: usize,
-    /// Width of the Gaussian over the distance field, in lattice spacings, 0 to 2. More rounds off
-    /// detail under the lattice's resolution; less keeps it, with a rough surface.
+    /// Width of the Gaussian over the distance field, in lattice spacings, 0 to 2, at least 0.75
+    /// voxels. More rounds off detail under the lattice's resolution; less keeps it, with a rough
+    /// surface.
     pub smoothing: f64,
     /// How often the edge of the cubes may double from label boundaries to the inside, 0 to 6. More
     /// follows the boundaries better for the same count, with smaller elements there, which shorten
@@ -245,6 +246,20 @@ mod tests {
         };
         // Two halvings: triangles of a sixteenth, except across the rim of the ball.
         assert!(mean(false) > 8.0 * mean(true), "{} {}", mean(false), mean(true));
+    }
+
+    /// What the coarse part lacks in volume is not made up for in the finer one.
+    #[test]
+    fn a_finer_region_lies_on_the_surface() {
+        let mask = mask_of([64; 3], millimetres(64), |p| p.length() < 28.0);
+        let fine = Some(Fine { centre: Vec3::new(0.0, 0.0, 28.0), radius_mm: 10.0, halvings: 2 });
+        let mesh = tetrahedra(&mask, &Config { target_tets: 1500, fine, ..Config::default() }).unwrap();
+        assert!((mesh.total_mm3() / (4.0 / 3.0 * std::f64::consts::PI * 28f64.powi(3)) - 1.0).abs() < 0.01);
+        let nodes = Surface::of(&mesh).nodes();
+        let radii = nodes.iter().map(|n| mesh.positions[*n as usize]);
+        let near: Vec<f32> = radii.filter(|p| p.truncate().length() < 8.0 && p.z > 0.0).map(Vec3::length).collect();
+        let mean = near.iter().sum::<f32>() / near.len() as f32;
+        assert!(near.len() > 10 && (mean - 28.0).abs() < 0.12, "{mean} mm at {} nodes", near.len());
     }
 
     #[test]

@@ -6,12 +6,14 @@
 //! the label with the largest φ + level. So regions neither overlap nor leave gaps, whatever the
 //! smoothing, and the outer surface is as smooth where two labels meet as elsewhere. Raising level₀
 //! moves the outer surface outwards by as much; raising a label's level moves its boundaries by
-//! half of that.
+//! half of that. Levels make up for what flat triangles cut off, which grows with the square of
+//! their edge h: in a finer region they count with (h / coarsest h)².
 //!
 //! # Practice
 //! Labels are indexed in ascending order from 1; 0 is the outside. Only the largest 6-connected
 //! labelled part is kept.
 
+use super::Fine;
 use super::field::{Block, Field};
 use crate::MeshError;
 use glam::DVec3;
@@ -49,7 +51,12 @@ pub(super) struct Regions {
     fields: Vec<Field>,
     /// The distance field of all labels together, if there are several.
     union: Option<Field>,
+    /// The finer region with its edge, mm.
+    fine: Option<(Fine, f64)>,
 }
+
+/// By how many finest edges from a finer region on the edge has grown by one more.
+const GROWTH: f64 = 1.5;
 
 impl Regions {
     /// The unsmoothed regions with a margin for smoothing up to `most_mm`.
@@ -75,12 +82,26 @@ impl Regions {
         let whole = blocks.iter().skip(1).fold(blocks[0].1, |whole, (_, block)| whole.with(block));
         let union = (blocks.len() > 1).then(|| Field::of(&labels, &whole, most_mm, |label| label != 0));
         let levels = vec![0.0; names.len()];
-        Ok(Self { names, mm3, levels, bounds: whole.world_box(&labels), fields, union })
+        Ok(Self { names, mm3, levels, bounds: whole.world_box(&labels), fields, union, fine: None })
     }
 
     /// Smooths all φ with a Gaussian of `sigma_mm`.
     pub(super) fn smooth(&mut self, sigma_mm: f64) {
         self.fields.iter_mut().chain(&mut self.union).for_each(|field| field.smooth(sigma_mm));
+    }
+
+    /// Sets the region with a finer boundary and the edge of its cubes, mm.
+    pub(super) fn refine(&mut self, fine: Option<Fine>, edge_mm: f64) {
+        self.fine = fine.map(|fine| (fine, edge_mm));
+    }
+
+    /// Share of the levels that counts at a point: the squared edge there over the coarsest.
+    fn share(&self, p: DVec3) -> f64 {
+        self.fine.map_or(1.0, |(fine, edge_mm)| {
+            let away = p.distance(fine.centre.as_dvec3()) - f64::from(fine.radius_mm);
+            let edges = 1.0 + away.max(0.0) / (GROWTH * edge_mm);
+            (edges / f64::from(1u32 << fine.halvings)).min(1.0).powi(2)
+        })
     }
 
     /// Approximate distance of a point from the nearest boundary, mm, and whether it is outside.
@@ -98,12 +119,12 @@ impl Regions {
 
     /// Depth of a point inside all labels together, mm.
     fn inside(&self, p: DVec3) -> f64 {
-        self.union.as_ref().unwrap_or(&self.fields[0]).sample(p) + self.levels[0]
+        self.union.as_ref().unwrap_or(&self.fields[0]).sample(p) + self.share(p) * self.levels[0]
     }
 
     /// Value of a label at a point inside.
     fn hold(&self, label: u16, p: DVec3) -> f64 {
-        self.fields[usize::from(label) - 1].sample(p) + self.levels[usize::from(label)]
+        self.fields[usize::from(label) - 1].sample(p) + self.share(p) * self.levels[usize::from(label)]
     }
 }
 

@@ -60,6 +60,7 @@ pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -
     let mut best = ((true, f64::INFINITY), LabelledMesh::default(), regions.levels.clone(), spacing);
     let mut stride = Stride::of(regions.names.len());
     for trial in 0..TRIALS {
+        regions.refine(config.fine, spacing);
         let Some(lattice) = lattice(regions, config, spacing, trial) else { break };
         let labelled = manifold::repaired(stencil::stuff(&lattice, regions));
         if labelled.mesh.tets.is_empty() {
@@ -88,6 +89,7 @@ pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -
     if !meets(nearest) {
         return Err(MeshError::Target { wanted, nearest });
     }
+    regions.refine(config.fine, spacing);
     polish::polish(&mut labelled, spacing, regions);
     Ok(labelled)
 }
