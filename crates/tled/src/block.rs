@@ -8,13 +8,15 @@
 //! and Miller 2009 (see `node_groups.rs`).
 //!
 //! # Practice
-//! A tetrahedron has 84 bytes of constants, and 48 more for the stress memory. Node numbers refer
-//! to the part that the block belongs to. Forces are added lane by lane for every register width,
-//! so that every kernel sums in the same order.
+//! A tetrahedron has 84 bytes of constants, and 48 more for the stress memory. With averaged
+//! pressure it has 40 more for F and J, which the volume pass hands to the force pass: that reads
+//! them in a row instead of its nodes' displacements. Node numbers refer to the part that the
+//! block belongs to. Forces are added lane by lane for every register width, so that every kernel
+//! sums in the same order.
 
-use crate::element::{deformation, forces};
-use crate::lane::{Lane, Quad, WIDTH};
-use crate::law::{Constitutive, Stress};
+use crate::element::{deformation, deformation_of, forces};
+use crate::lane::{Lane, NODES, Quad, WIDTH};
+use crate::law::{Constitutive, Deformation, Stress};
 use crate::pass::{Pass, PassReport};
 use crate::relaxation::Fade;
 use crate::stiffness::{stiffness, stiffness_at_rest};
@@ -38,29 +40,57 @@ pub(crate) struct Block<const K: usize> {
 /// Stress memory of a block, T Prony terms.
 pub(crate) type Memory<const T: usize> = [[[f32; WIDTH]; 6]; T];
 
+/// F by rows and det F of a block, from the volume pass for the force pass.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(crate) struct Strain {
+    f: [[[f32; WIDTH]; 3]; 3],
+    j: [f32; WIDTH],
+}
+
 /// The force pass.
 pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     pub blocks: &'a [Block<K>],
     pub memory: &'a mut [Memory<T>],
     pub fade: [Fade; 2],
-    pub u: &'a [Quad],
-    pub sums: &'a mut [Quad],
-    pub averaged_pressure: bool,
+    pub u: &'a [Quad; NODES],
+    /// Of every block with averaged pressure, else empty.
+    pub strains: &'a [Strain],
+    /// Mean `J - 1` by node; read with averaged pressure only.
+    pub averages: &'a [f32; NODES],
+    pub sums: &'a mut [Quad; NODES],
     pub law: PhantomData<M>,
 }
 
 /// The volume pass.
 pub(crate) struct Volumes<'a, const K: usize> {
     pub blocks: &'a [Block<K>],
-    pub u: &'a [Quad],
+    pub u: &'a [Quad; NODES],
+    pub strains: &'a mut [Strain],
     /// `Σ V (J - 1) / 4` by node, mm³.
-    pub shares: &'a mut [f32],
+    pub shares: &'a mut [f32; NODES],
 }
 
-/// Displacement differences along an element's edges, and the mean of its nodes' `J - 1`.
-struct Moved<L> {
-    edges: [[L; 3]; 3],
-    mean: L,
+impl Strain {
+    /// No deformation.
+    pub const NONE: Self = {
+        let (zero, one) = ([0.0; WIDTH], [1.0; WIDTH]);
+        Self { f: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], j: one }
+    };
+
+    #[inline(always)]
+    fn store<L: Lane>(&mut self, d: &Deformation<L>, part: usize) {
+        for (row, f) in self.f.as_flattened_mut().iter_mut().zip(d.f.as_flattened()) {
+            f.store(row, part);
+        }
+        d.j.store(&mut self.j, part);
+    }
+
+    #[inline(always)]
+    fn deformation<L: Lane>(&self, part: usize) -> Deformation<L> {
+        let [a, b, c] = &self.f;
+        deformation_of([load(a, part), load(b, part), load(c, part)], L::load(&self.j, part))
+    }
 }
 
 impl<const K: usize> Block<K> {
@@ -101,12 +131,12 @@ impl<const K: usize> Block<K> {
         [load(a, part), load(b, part), load(c, part)]
     }
 
+    /// Deformation from the nodes' displacements.
     #[inline(always)]
-    fn moved<L: Lane>(&self, part: usize, u: &[Quad]) -> Moved<L> {
+    fn deformation<L: Lane>(&self, part: usize, u: &[Quad; NODES]) -> Deformation<L> {
         let [o, a, b, c] = self.corners::<L>(part);
         let (o, a, b, c) = (L::gather(u, o), L::gather(u, a), L::gather(u, b), L::gather(u, c));
-        let mean = (o[3] + a[3] + b[3] + c[3]) * L::splat(0.25);
-        Moved { edges: [minus(&a, &o), minus(&b, &o), minus(&c, &o)], mean }
+        deformation(&[minus(&a, &o), minus(&b, &o), minus(&c, &o)], &self.gradients::<L>(part))
     }
 
     /// Node numbers of the lanes, corner by corner.
@@ -132,15 +162,23 @@ pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
 impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, K, T> {
     #[inline(always)]
     fn run<L: Lane>(&mut self) -> PassReport {
+        if self.strains.is_empty() { self.sum::<L, false>() } else { self.sum::<L, true>() }
+    }
+}
+
+impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
+    /// Adds up the forces, with averaged pressure if A.
+    #[inline(always)]
+    fn sum<L: Lane, const A: bool>(&mut self) -> PassReport {
         let (mut inverted, mut growth) = (0, L::splat(0.0));
-        for (block, memory) in self.blocks.iter().zip(self.memory.iter_mut()) {
+        for (i, (block, memory)) in self.blocks.iter().zip(self.memory.iter_mut()).enumerate() {
             for part in 0..WIDTH / L::LANES {
-                let moved = block.moved::<L>(part, self.u);
+                let corners = block.corners::<L>(part);
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
-                let d = deformation(&moved.edges, &gradients);
+                let d = if A { self.strains[i].deformation::<L>(part) } else { block.deformation::<L>(part, self.u) };
                 let mut stress = M::stress(&constants, &d);
                 let (own, (resistance, _)) = (d.j - L::splat(1.0), d.resistance());
-                let volume_change = if self.averaged_pressure { moved.mean } else { own } - resistance;
+                let volume_change = if A { L::mean(self.averages, corners) } else { own } - resistance;
                 let moduli = M::moduli(&constants);
                 let gained = stiffness(&stress, moduli, &d, volume_change)
                     - stiffness_at_rest(M::stress_at_rest(&constants), moduli);
@@ -153,7 +191,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let zero = L::splat(0.0);
                 let f0 =
                     [zero - (f1[0] + f2[0] + f3[0]), zero - (f1[1] + f2[1] + f3[1]), zero - (f1[2] + f2[2] + f3[2])];
-                L::add_rows([f0, f1, f2, f3], self.sums, block.corners::<L>(part));
+                L::add_rows([f0, f1, f2, f3], self.sums, corners);
                 inverted += d.j.not_positive();
             }
         }
@@ -164,17 +202,20 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
 impl<const K: usize> Pass for Volumes<'_, K> {
     #[inline(always)]
     fn run<L: Lane>(&mut self) -> PassReport {
-        for block in self.blocks {
-            let mut row = [0.0; WIDTH];
+        // Shares are added while the next elements' are computed: neither waits for the other.
+        let mut late: Option<(L, [&[u32]; 4])> = None;
+        for (block, strain) in self.blocks.iter().zip(self.strains.iter_mut()) {
             for part in 0..WIDTH / L::LANES {
-                let moved = block.moved::<L>(part, self.u);
-                let d = deformation(&moved.edges, &block.gradients::<L>(part));
+                let d = block.deformation::<L>(part, self.u);
+                strain.store(&d, part);
                 let share = L::load(&block.quarter_volume, part) * (d.j - L::splat(1.0));
-                share.store(&mut row, part);
+                if let Some((share, corners)) = late.replace((share, block.corners::<L>(part))) {
+                    share.add_to(self.shares, corners);
+                }
             }
-            for (lane, share) in row.into_iter().enumerate() {
-                block.nodes.iter().for_each(|corner| self.shares[corner[lane] as usize] += share);
-            }
+        }
+        if let Some((share, corners)) = late {
+            share.add_to(self.shares, corners);
         }
         PassReport::default()
     }
@@ -203,7 +244,7 @@ fn relax<L: Lane, const T: usize>(
 }
 
 #[inline(always)]
-fn minus<L: Lane>(a: &[L; 4], b: &[L; 4]) -> [L; 3] {
+fn minus<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

@@ -35,7 +35,7 @@ pub struct Config {
     pub max_displacement: f32,
     /// Averages the volume change over the elements of one material around each node (averaged
     /// nodal pressure). Nearly incompressible tissue (ν over about 0.47) then does not lock, and
-    /// other tissue bends less stiffly. Costs about half a step.
+    /// other tissue bends less stiffly. Costs about a quarter of a step.
     pub averaged_pressure: bool,
     /// Stress relaxation (Prony series).
     pub relaxation: Relaxation,

@@ -17,8 +17,24 @@ pub(crate) fn deformation<L: Lane>(edges: &[[L; 3]; 3], gradients: &[[L; 3]; 3])
     let (f, one) = (displacement_gradient(edges, gradients), L::splat(1.0));
     let [[f00, f01, f02], [f10, f11, f12], [f20, f21, f22]] = f;
     let f = [[f00 + one, f01, f02], [f10, f11 + one, f12], [f20, f21, f22 + one]];
-    let c = [cross(&f[1], &f[2]), cross(&f[2], &f[0]), cross(&f[0], &f[1])];
-    let j = dot(&f[0], &c[0]);
+    let c = cofactor(&f);
+    with_ratio(f, c, dot(&f[0], &c[0]))
+}
+
+/// The deformation with these rows of F and this det F.
+#[inline(always)]
+pub(crate) fn deformation_of<L: Lane>(f: [[L; 3]; 3], j: L) -> Deformation<L> {
+    with_ratio(f, cofactor(&f), j)
+}
+
+/// Rows of cof F.
+#[inline(always)]
+fn cofactor<L: Lane>(f: &[[L; 3]; 3]) -> [[L; 3]; 3] {
+    [cross(&f[1], &f[2]), cross(&f[2], &f[0]), cross(&f[0], &f[1])]
+}
+
+#[inline(always)]
+fn with_ratio<L: Lane>(f: [[L; 3]; 3], c: [[L; 3]; 3], j: L) -> Deformation<L> {
     let clamped = j.at_least(trepan_soft::FADE_BELOW as f32);
     Deformation { f, c, j, clamped, root: clamped.inverse_cube_root() }
 }

@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::force_slots::ForceSlots;
-use crate::lane::WIDTH;
+use crate::lane::{NODES, WIDTH};
 use crate::layout::{Layout, kind};
 use crate::node_groups::NodeGroups;
 use crate::nodes::{Nodes, Update};
@@ -17,6 +17,7 @@ use trepan_soft::Body;
 /// Elements of a part: enough that gathering is cheap, few enough that its nodes stay in the L1
 /// cache.
 const PART: usize = 64 * WIDTH;
+const _: () = assert!(4 * PART <= NODES);
 
 /// The elements and nodes of a body.
 pub(crate) struct Elements {
@@ -38,14 +39,7 @@ impl Elements {
         let (force_slots, slots) = ForceSlots::of(&owned, &node_groups, layout.node_at.len(), inverse_volume);
         let part = |((tets, groups), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
             let places = groups.iter().map(|&s| node_groups.place_of[s as usize]).collect();
-            Part::of(
-                body,
-                scaling,
-                tets,
-                &groups_of,
-                PartGroups { node_groups: groups, places, slots },
-                &config.relaxation,
-            )
+            Part::of(body, scaling, tets, &groups_of, PartGroups { node_groups: groups, places, slots }, config)
         };
         let parts = tets_of.iter().zip(owned).zip(slots).map(part).collect();
         Self {

@@ -10,8 +10,12 @@ use wide::{f32x8, u32x8};
 /// Tetrahedra in a block.
 pub(crate) const WIDTH: usize = 16;
 
-/// A 16-byte row of four numbers: a node's displacement and `J - 1`, or a force and padding.
+/// A 16-byte row of four numbers: a node's displacement or a force, and padding.
 pub(crate) type Quad = [f32; 4];
+
+/// Rows of a part's tables, at least its nodes. A node number modulo this power of two is always
+/// inside, so that kernels read and add rows without a check and a branch each.
+pub(crate) const NODES: usize = 4096;
 
 /// A register of f32, one lane per element.
 ///
@@ -26,10 +30,10 @@ pub(crate) trait Lane:
     fn splat(x: f32) -> Self;
     /// Loads lanes `part * LANES ..` of a block's row.
     fn load(row: &[f32; WIDTH], part: usize) -> Self;
-    /// Loads the four numbers of one node for each lane.
-    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4];
+    /// Loads the vector of one node for each lane.
+    fn gather(from: &[Quad; NODES], at: &[u32]) -> [Self; 3];
     /// Adds the vectors of four corners to their rows, lane by lane and corner by corner.
-    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]);
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad; NODES], at: [&[u32]; 4]);
     /// The larger of each lane and `floor`; `floor` for NaN.
     fn at_least(self, floor: f32) -> Self;
     /// The larger of two; `other` where this one is NaN.
@@ -50,6 +54,36 @@ pub(crate) trait Lane:
     fn mantissa(self) -> Self;
     /// `2^n` for a whole n from -126 to 127.
     fn power_of_two(self) -> Self;
+
+    /// Loads the number of one node for each lane.
+    #[inline(always)]
+    fn numbers(from: &[f32; NODES], at: &[u32]) -> Self {
+        let mut row = [0.0; WIDTH];
+        for lane in 0..Self::LANES {
+            row[lane] = from[at[lane] as usize % NODES];
+        }
+        Self::load(&row, 0)
+    }
+
+    /// Mean of the numbers of four corners for each lane.
+    #[inline(always)]
+    fn mean(from: &[f32; NODES], [o, a, b, c]: [&[u32]; 4]) -> Self {
+        let (o, a, b, c) =
+            (Self::numbers(from, o), Self::numbers(from, a), Self::numbers(from, b), Self::numbers(from, c));
+        (o + a + b + c) * Self::splat(0.25)
+    }
+
+    /// Adds each lane to the numbers of its four corners, lane by lane and corner by corner.
+    #[inline(always)]
+    fn add_to(self, to: &mut [f32; NODES], at: [&[u32]; 4]) {
+        let mut row = [0.0; WIDTH];
+        self.store(&mut row, 0);
+        for lane in 0..Self::LANES {
+            for at in at {
+                to[at[lane] as usize % NODES] += row[lane];
+            }
+        }
+    }
 
     /// The largest of its lanes.
     #[inline(always)]
@@ -153,14 +187,15 @@ impl Lane for f32 {
     }
 
     #[inline(always)]
-    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4] {
-        from[at[0] as usize]
+    fn gather(from: &[Quad; NODES], at: &[u32]) -> [Self; 3] {
+        let [x, y, z, _] = from[at[0] as usize % NODES];
+        [x, y, z]
     }
 
     #[inline(always)]
-    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad; NODES], at: [&[u32]; 4]) {
         for (corner, at) in corners.iter().zip(at) {
-            let row = &mut to[at[0] as usize];
+            let row = &mut to[at[0] as usize % NODES];
             (0..3).for_each(|k| row[k] += corner[k]);
         }
     }
@@ -234,21 +269,21 @@ impl Lane for f32x8 {
     }
 
     #[inline(always)]
-    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4] {
-        let mut columns = [[0.0; 8]; 4];
+    fn gather(from: &[Quad; NODES], at: &[u32]) -> [Self; 3] {
+        let mut columns = [[0.0; 8]; 3];
         for lane in 0..8 {
-            let [x, y, z, w] = from[at[lane] as usize];
-            (columns[0][lane], columns[1][lane], columns[2][lane], columns[3][lane]) = (x, y, z, w);
+            let [x, y, z, _] = from[at[lane] as usize % NODES];
+            (columns[0][lane], columns[1][lane], columns[2][lane]) = (x, y, z);
         }
         columns.map(Self::new)
     }
 
     #[inline(always)]
-    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad; NODES], at: [&[u32]; 4]) {
         let corners = corners.map(|corner| corner.map(Self::to_array));
         for lane in 0..8 {
             for (corner, at) in corners.iter().zip(at) {
-                let row = &mut to[at[lane] as usize];
+                let row = &mut to[at[lane] as usize % NODES];
                 (0..3).for_each(|k| row[k] += corner[k][lane]);
             }
         }

@@ -17,6 +17,7 @@ use crate::principal::{Symmetric, principal};
 use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
 
 /// Deformation of an element as the laws need it.
+#[derive(Clone, Copy)]
 pub(crate) struct Deformation<L> {
     /// Rows of F.
     pub f: [[L; 3]; 3],

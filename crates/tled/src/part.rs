@@ -16,17 +16,18 @@
 //! sleeping parts cost no work.
 //!
 //! # Practice
-//! Copies and sums of a part take 10 kB: they stay in the L1 cache while its elements are read in
-//! order.
+//! Copies and sums of a part take 10 kB at the start of their tables: they stay in the L1 cache
+//! while its elements are read in order.
 
-use crate::block::{Block, Forces, Memory, Volumes};
+use crate::block::{Block, Forces, Memory, Strain, Volumes};
+use crate::config::Config;
 use crate::force_slots::ForceSlots;
 use crate::kernel::Kernel;
-use crate::lane::{Quad, WIDTH};
+use crate::lane::{NODES, Quad, WIDTH};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::nodes::Nodes;
 use crate::pass::PassReport;
-use crate::relaxation::{Fade, Relaxation};
+use crate::relaxation::Fade;
 use crate::scaling::Scaling;
 use glam::Vec4;
 use std::marker::PhantomData;
@@ -36,10 +37,11 @@ use trepan_soft::{Body, Law};
 pub(crate) struct Part {
     elements: Box<dyn LawElements>,
     groups: PartGroups,
-    u: Vec<Quad>,
-    sums: Vec<Quad>,
-    /// A quarter of the volume change of the elements around each node, mm³.
-    shares: Vec<f32>,
+    u: Box<[Quad; NODES]>,
+    sums: Box<[Quad; NODES]>,
+    /// A quarter of the volume change of the elements around each node, mm³; then the mean `J - 1`
+    /// of its node group.
+    volumes: Box<[f32; NODES]>,
     /// Report of the last force pass.
     pub report: PassReport,
     tets: usize,
@@ -81,14 +83,24 @@ pub(crate) struct PartGroups {
 
 /// Elements of one constitutive law.
 trait LawElements: Send {
-    fn forces(&mut self, kernel: Kernel, how: &Forcing, u: &[Quad], sums: &mut [Quad]) -> PassReport;
-    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]);
+    /// Adds up the forces from displacements by node, or with averaged pressure from the mean
+    /// `J - 1` by node and the last volume pass.
+    fn forces(
+        &mut self,
+        kernel: Kernel,
+        fade: [Fade; 2],
+        of: (&[Quad; NODES], &[f32; NODES]),
+        sums: &mut [Quad; NODES],
+    ) -> PassReport;
+    fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]);
     fn forget(&mut self);
 }
 
 struct Blocks<M, const K: usize, const T: usize> {
     blocks: Vec<Block<K>>,
     memory: Vec<Memory<T>>,
+    /// Of every block with averaged pressure, else empty.
+    strains: Vec<Strain>,
     law: PhantomData<M>,
 }
 
@@ -101,15 +113,15 @@ impl Part {
         tets: &[u32],
         groups_of: &dyn Fn(u32) -> [u32; 4],
         groups: PartGroups,
-        relaxation: &Relaxation,
+        config: &Config,
     ) -> Self {
         let nodes = |t: u32| groups_of(t).map(|s| groups.node_groups.partition_point(|&o| o < s) as u32);
         let zero = vec![[0.0; 4]; groups.places.len()];
         Self {
-            elements: elements_of(body, scaling, tets, &nodes, relaxation),
-            u: zero.clone(),
-            sums: zero.clone(),
-            shares: vec![0.0; zero.len()],
+            elements: elements_of(body, scaling, tets, &nodes, config),
+            u: bytemuck::zeroed_box(),
+            sums: bytemuck::zeroed_box(),
+            volumes: bytemuck::zeroed_box(),
             report: PassReport::default(),
             tets: tets.len(),
             anchor: zero,
@@ -124,12 +136,12 @@ impl Part {
             return;
         }
         self.copy(nodes);
-        self.shares.fill(0.0);
-        self.elements.volumes(kernel, &self.u, &mut self.shares);
+        self.volumes[..self.groups.places.len()].fill(0.0);
+        self.elements.volumes(kernel, &self.u, &mut self.volumes);
         self.groups
             .slots
             .iter()
-            .zip(&self.shares)
+            .zip(&*self.volumes)
             .for_each(|(&slot, &share)| force_slots.shares.set(slot as usize, share));
     }
 
@@ -143,17 +155,18 @@ impl Part {
         }
         if how.averaged_pressure {
             let averages = self.groups.node_groups.iter().map(|&group| force_slots.volume_change.get(group as usize));
-            self.u.iter_mut().zip(averages).for_each(|(u, average)| u[3] = average);
+            self.volumes.iter_mut().zip(averages).for_each(|(to, average)| *to = average);
         } else {
             self.copy(nodes);
         }
-        self.sums.fill([0.0; 4]);
-        self.report = self.elements.forces(kernel, how, &self.u, &mut self.sums);
+        let used = self.groups.places.len();
+        self.sums[..used].fill([0.0; 4]);
+        self.report = self.elements.forces(kernel, how.fade, (&self.u, &self.volumes), &mut self.sums);
         if self.quiet_ms > DOZE_MS {
             self.quiet_ms = f32::INFINITY;
-            self.sums.iter_mut().for_each(|sum| sum[3] = 1.0);
+            self.sums[..used].iter_mut().for_each(|sum| sum[3] = 1.0);
         }
-        self.groups.slots.iter().zip(&self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
+        self.groups.slots.iter().zip(&*self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
     }
 
     /// Number of elements, and number of awake elements.
@@ -203,11 +216,11 @@ fn elements_of(
     scaling: &Scaling,
     tets: &[u32],
     nodes: &dyn Fn(u32) -> [u32; 4],
-    relaxation: &Relaxation,
+    config: &Config,
 ) -> Box<dyn LawElements> {
-    let of = (body, scaling);
+    let of = (body, scaling, config.averaged_pressure);
     match body.material(tets[0] as usize).law() {
-        Law::NeoHookean(_) if relaxation.is_none() => Box::new(Blocks::<NeoHookean, 2, 0>::new(of, tets, nodes)),
+        Law::NeoHookean(_) if config.relaxation.is_none() => Box::new(Blocks::<NeoHookean, 2, 0>::new(of, tets, nodes)),
         Law::NeoHookean(_) => Box::new(Blocks::<NeoHookean, 2, 2>::new(of, tets, nodes)),
         Law::StVenantKirchhoff { .. } => Box::new(Blocks::<StVenantKirchhoff, 2, 2>::new(of, tets, nodes)),
         Law::MooneyRivlin { .. } => Box::new(Blocks::<MooneyRivlin, 3, 2>::new(of, tets, nodes)),
@@ -218,25 +231,36 @@ fn elements_of(
 impl<M: Constitutive<K>, const K: usize, const T: usize> Blocks<M, K, T> {
     /// Fills the blocks. Neighbours go to the same lane of different blocks, so that consecutive
     /// lanes of a block seldom add to the same node.
-    fn new((body, scaling): (&Body, &Scaling), tets: &[u32], nodes: &dyn Fn(u32) -> [u32; 4]) -> Self {
+    fn new(
+        (body, scaling, averaged_pressure): (&Body, &Scaling, bool),
+        tets: &[u32],
+        nodes: &dyn Fn(u32) -> [u32; 4],
+    ) -> Self {
         let mut blocks = vec![Block::empty(); tets.len().div_ceil(WIDTH)];
         let count = blocks.len();
         for (at, &t) in tets.iter().enumerate() {
             let tissue = (&body.shape(t as usize), body.material(t as usize), scaling.factor(t));
             blocks[at % count].put::<M>(at / count, tissue, nodes(t));
         }
-        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; count], blocks, law: PhantomData }
+        let strains = vec![Strain::NONE; if averaged_pressure { count } else { 0 }];
+        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; count], blocks, strains, law: PhantomData }
     }
 }
 
 impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for Blocks<M, K, T> {
-    fn forces(&mut self, kernel: Kernel, how: &Forcing, u: &[Quad], sums: &mut [Quad]) -> PassReport {
-        let (blocks, memory, &Forcing { fade, averaged_pressure, .. }) = (&self.blocks, &mut self.memory, how);
-        kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, sums, averaged_pressure, law: PhantomData })
+    fn forces(
+        &mut self,
+        kernel: Kernel,
+        fade: [Fade; 2],
+        (u, averages): (&[Quad; NODES], &[f32; NODES]),
+        sums: &mut [Quad; NODES],
+    ) -> PassReport {
+        let Self { blocks, memory, strains, law } = self;
+        kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, strains, averages, sums, law: *law })
     }
 
-    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]) {
-        kernel.run(&mut Volumes { blocks: &self.blocks, u, shares });
+    fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]) {
+        kernel.run(&mut Volumes { blocks: &self.blocks, u, strains: &mut self.strains, shares });
     }
 
     fn forget(&mut self) {

@@ -3,7 +3,7 @@
 //! # Theory
 //! Nodes are read as whole 16-byte rows and transposed 4×4 in registers; forces are transposed back
 //! and added as rows. The gather instruction is slower than this, and the compiler does not
-//! generate the transposition by itself.
+//! generate the transposition by itself. It is faster for single numbers in the AVX-512 kernel.
 //!
 //! ```text
 //! rows 4q+i (x y z 0) ── r_i, a 128-bit part q each ──▶ unpack, shuffle ──▶ x, y, z of 4 lanes
@@ -16,7 +16,7 @@
     reason = "the instructions are unsafe to call where the compiler cannot see that the CPU has them"
 )]
 
-use crate::lane::{BIASED, FRACTION, Lane, ONE, Quad, ROOT_BITS, SIGN, WHOLE, WIDTH};
+use crate::lane::{BIASED, FRACTION, Lane, NODES, ONE, Quad, ROOT_BITS, SIGN, WHOLE, WIDTH};
 use crate::pass::{Pass, PassReport};
 use std::arch::x86_64::*;
 use std::mem::transmute;
@@ -225,26 +225,26 @@ macro_rules! lane {
 }
 
 #[inline(always)]
-fn row(from: &[Quad], at: u32) -> __m128 {
+fn row(from: &[Quad; NODES], at: u32) -> __m128 {
     // SAFETY: both are 16 bytes of any bits.
-    unsafe { transmute::<Quad, __m128>(from[at as usize]) }
+    unsafe { transmute::<Quad, __m128>(from[at as usize % NODES]) }
 }
 
 #[inline(always)]
-fn add(row: __m128, to: &mut [Quad], at: u32) {
-    let sum = &mut to[at as usize];
+fn add(row: __m128, to: &mut [Quad; NODES], at: u32) {
+    let sum = &mut to[at as usize % NODES];
     // SAFETY: both are 16 bytes of any bits, and every x86-64 has SSE.
     *sum = unsafe { transmute::<__m128, Quad>(_mm_add_ps(transmute::<Quad, __m128>(*sum), row)) };
 }
 
 #[inline(always)]
-fn two_rows(from: &[Quad], at: &[u32], i: usize) -> __m256 {
+fn two_rows(from: &[Quad; NODES], at: &[u32], i: usize) -> __m256 {
     // SAFETY: called only inside the AVX2 kernel.
     unsafe { _mm256_set_m128(row(from, at[i + 4]), row(from, at[i])) }
 }
 
 #[inline(always)]
-fn four_rows(from: &[Quad], at: &[u32], i: usize) -> __m512 {
+fn four_rows(from: &[Quad; NODES], at: &[u32], i: usize) -> __m512 {
     // SAFETY: called only inside the AVX-512 kernel.
     unsafe {
         let first = _mm512_castps128_ps512(row(from, at[i]));
@@ -256,7 +256,7 @@ fn four_rows(from: &[Quad], at: &[u32], i: usize) -> __m512 {
 
 /// Adds the vectors of lanes 4Q to 4Q + 3.
 #[inline(always)]
-fn add_quarter<const Q: i32>(corners: &[[__m512; 4]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+fn add_quarter<const Q: i32>(corners: &[[__m512; 4]; 4], to: &mut [Quad; NODES], at: [&[u32]; 4]) {
     for lane in 0..4 {
         for (rows, at) in corners.iter().zip(at) {
             // SAFETY: called only inside the AVX-512 kernel.
@@ -267,14 +267,14 @@ fn add_quarter<const Q: i32>(corners: &[[__m512; 4]; 4], to: &mut [Quad], at: [&
 
 lane! { Ymm(__m256) of 8, ymm,
     #[inline(always)]
-    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4] {
+    fn gather(from: &[Quad; NODES], at: &[u32]) -> [Self; 3] {
         let rows = [two_rows(from, at, 0), two_rows(from, at, 1), two_rows(from, at, 2), two_rows(from, at, 3)];
-        let [x, y, z, w] = Self::transposed(rows);
-        [Self(x), Self(y), Self(z), Self(w)]
+        let [x, y, z, _] = Self::transposed(rows);
+        [Self(x), Self(y), Self(z)]
     }
 
     #[inline(always)]
-    fn add_rows([o, a, b, c]: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+    fn add_rows([o, a, b, c]: [[Self; 3]; 4], to: &mut [Quad; NODES], at: [&[u32]; 4]) {
         let corners = [Self::rows(o), Self::rows(a), Self::rows(b), Self::rows(c)];
         for lane in 0..4 {
             for (rows, at) in corners.iter().zip(at) {
@@ -300,14 +300,25 @@ lane! { Ymm(__m256) of 8, ymm,
 
 lane! { Zmm(__m512) of 16, zmm,
     #[inline(always)]
-    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4] {
-        let rows = [four_rows(from, at, 0), four_rows(from, at, 1), four_rows(from, at, 2), four_rows(from, at, 3)];
-        let [x, y, z, w] = Self::transposed(rows);
-        [Self(x), Self(y), Self(z), Self(w)]
+    fn numbers(from: &[f32; NODES], at: &[u32]) -> Self {
+        // SAFETY: called only inside the AVX-512 kernel; both are 64 bytes of any bits, and every
+        // number is below the length once its high bits are cleared.
+        unsafe {
+            let at = _mm512_loadu_si512(at[..16].as_ptr().cast());
+            let within = _mm512_and_si512(at, _mm512_set1_epi32(NODES as i32 - 1));
+            Self(_mm512_i32gather_ps::<4>(within, from.as_ptr().cast()))
+        }
     }
 
     #[inline(always)]
-    fn add_rows([o, a, b, c]: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+    fn gather(from: &[Quad; NODES], at: &[u32]) -> [Self; 3] {
+        let rows = [four_rows(from, at, 0), four_rows(from, at, 1), four_rows(from, at, 2), four_rows(from, at, 3)];
+        let [x, y, z, _] = Self::transposed(rows);
+        [Self(x), Self(y), Self(z)]
+    }
+
+    #[inline(always)]
+    fn add_rows([o, a, b, c]: [[Self; 3]; 4], to: &mut [Quad; NODES], at: [&[u32]; 4]) {
         let corners = [Self::rows(o), Self::rows(a), Self::rows(b), Self::rows(c)];
         add_quarter::<0>(&corners, to, at);
         add_quarter::<1>(&corners, to, at);
