@@ -14,6 +14,7 @@ use crate::tissue_class::TissueClass;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_budget::Tissue;
+use trepan_gpu::{Gpu, Prefer};
 use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
 use trepan_tled::gpu::WithSpare;
@@ -71,6 +72,7 @@ pub(crate) fn build(
     let config = Config { still_mm: tissue.still_mm as f32, ..ingredients.config() };
     let (on_card, remark) = match ingredients.device {
         SolverDevice::Cpu => (None, None),
+        SolverDevice::Fastest if ingredients.surface_pressure_mmhg > 0.0 => (None, None),
         _ if ingredients.surface_pressure_mmhg > 0.0 => (None, Some(elsewhere("it has no surface pressure"))),
         SolverDevice::Fastest if !is_faster_on_card(body, &config)? => (None, None),
         _ => match WithSpare::on_a_card(body, &config) {
@@ -152,8 +154,11 @@ fn wet(body: &Body) -> Vec<[u32; 3]> {
     Surface::of(&TetMesh { positions: body.mesh.positions.clone(), tets }).triangles
 }
 
-/// Tries both devices for a time.
+/// Tries both devices for a time, if there is a card.
 fn is_faster_on_card(body: &Body, config: &Config) -> Result<bool, SessionError> {
+    if Gpu::open(Prefer::Hardware).map_or(true, |gpu| gpu.is_software()) {
+        return Ok(false);
+    }
     let clock = Clock::start();
     let all = choice::candidates(body, config);
     let chosen = choice::fastest(&all, &Loads::default(), TRIAL_MS, &|| clock.now_ms());

@@ -194,8 +194,10 @@ pub const KEYS: &[Key] = &[
     Key {
         name: "device",
         values: names::<SolverDevice>,
-        about: "where the solver runs; gpu: on a graphics card, else on the processor with a remark",
+        about: "where the solver runs; gpu: on a graphics card, else on the processor with a remark; \
+                fastest: on the faster of both",
         usual: Some("cpu"),
+        presets: &[(Quality::Auto, "fastest")],
         compared: others::<SolverDevice>,
         effect: |_| Effect::Rounding,
         get: |i| Some(name(&i.device)),
@@ -555,7 +557,8 @@ mod tests {
             ..Ingredients::default()
         };
         let all = Quality::ALL.map(Ingredients::of);
-        assert_eq!(all, [matters.clone(), Ingredients::default(), Ingredients::default(), matters]);
+        let auto = Ingredients { device: SolverDevice::Fastest, ..matters.clone() };
+        assert_eq!(all, [auto, Ingredients::default(), Ingredients::default(), matters]);
         let fine = Key { usual: Some("plain"), presets: &[(Quality::Fine, "locking-free")], ..Key::of(Part::Tled) };
         assert_eq!(fine.in_quality(Quality::Fine), Some("locking-free"));
         assert_eq!(fine.in_quality(Quality::Draft), Some("plain"));
