@@ -55,7 +55,7 @@ pub use case::scene::{RestBrain, Scene};
 pub use command::command;
 pub use error::SessionError;
 pub use ingredients::{Effect, Element, Ingredients, Law, Relaxation, SolverDevice};
-pub use ingredients::{Variant, realistic, variants};
+pub use ingredients::{Variant, of_quality, realistic, variants};
 pub use options::Options;
 pub use program::{Phase, Program};
 pub use recipe::Recipe;

@@ -14,7 +14,7 @@ mod variants;
 pub use keys::Effect;
 pub(crate) use keys::{Given, KEYS, Part, setting, table};
 pub use law::Law;
-pub use variants::{Variant, realistic, variants};
+pub use variants::{Variant, of_quality, realistic, variants};
 
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;

@@ -1,6 +1,7 @@
 //! Values of the keys that a comparison runs beside the default.
 
 use super::keys::{Effect, KEYS, Key};
+use trepan_budget::Quality;
 
 /// A value of a key beside the default.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +19,12 @@ impl Variant {
     pub fn setting(&self) -> String {
         format!("{}={}", self.key, self.value)
     }
+
+    /// The same key with its usual value, where it has one.
+    pub fn usual(&self) -> Option<Self> {
+        let value = KEYS.iter().find(|key| key.name == self.key)?.usual?;
+        Some(Self { value: value.into(), ..self.clone() })
+    }
 }
 
 /// Every value to compare with the default: the table's keys in order, with the most telling value
@@ -28,6 +35,15 @@ pub fn variants() -> Vec<Variant> {
         (key.compared)().into_iter().map(variant)
     };
     KEYS.iter().flat_map(of_key).collect()
+}
+
+/// The values by which a quality differs from the usual, whatever the machine.
+pub fn of_quality(quality: Quality) -> Vec<Variant> {
+    let of_key = |key: &'static Key| {
+        let (_, value) = key.presets.iter().find(|(preset, _)| *preset == quality)?;
+        Some(Variant { key: key.name, value: (*value).into(), effect: (key.effect)(value) })
+    };
+    KEYS.iter().filter_map(of_key).filter(|variant| variant.effect == Effect::Model).collect()
 }
 
 /// The values that physical realism asks for, of every key that has one.
@@ -43,7 +59,6 @@ pub fn realistic() -> Vec<Variant> {
 mod tests {
     use super::super::{Ingredients, setting};
     use super::*;
-    use trepan_budget::Quality;
 
     /// Without values stands what means nothing alone: points of a method without points.
     #[test]
@@ -62,6 +77,18 @@ mod tests {
             assert_eq!(all.iter().filter(|other| *other == variant).count(), 1, "{} once", variant.setting());
         }
         assert_eq!(realistic().len(), 7);
+    }
+
+    #[test]
+    fn what_auto_adds_is_what_its_ingredients_have() {
+        let mut made = Ingredients::of(Quality::Usual);
+        for variant in of_quality(Quality::Auto) {
+            let given = setting(&variant.setting()).unwrap().unwrap();
+            given.key.set(&mut made, &given.text).unwrap();
+            assert_ne!(variant.usual().unwrap(), variant);
+        }
+        assert_eq!(Ingredients { device: made.device, ..Ingredients::of(Quality::Auto) }, made);
+        assert_eq!(of_quality(Quality::Usual), []);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Limits, chart, table and conclusions from the rows of all runs.
 
 use super::change::{BONE_N, PICTURE_PERCENT, SHOWN_MM, tissue_tolerance_n};
-use super::{AGAIN, EFFECT, NOT_RUN, SCENE};
+use super::{AGAIN, EFFECT, LEFT_OUT, NOT_RUN, SCENE};
 use crate::engine::picture::{Chart, Mark, Table};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
@@ -43,8 +43,13 @@ fn effect(row: &Row) -> &str {
     row.config.get(EFFECT).and_then(|effect| effect.as_str()).unwrap_or_default()
 }
 
+/// Whether a run leaves out what the default has.
+fn is_left_out(row: &Row) -> bool {
+    row.config.get(LEFT_OUT).and_then(|left_out| left_out.as_bool()).unwrap_or_default()
+}
+
 /// What a run must keep. That an ingredient changes more than the tolerance is a known gap of the
-/// default, which leaves it out.
+/// default, which does not have it.
 fn limits(row: &Row) -> Vec<Gate> {
     let name = &row.method;
     let at_most = |what: &str, value: f64, limit: f64| Gate::at_most(format!("{name}: {what}"), value, limit);
@@ -69,6 +74,7 @@ fn limits(row: &Row) -> Vec<Gate> {
                 ROUNDING_MM,
             ));
         }
+        _ if is_left_out(row) => {}
         _ => limits
             .push(at_most("worst change over its tolerance", number(row, "change_over_tolerance"), 1.0).or_known_gap()),
     }

@@ -1,8 +1,10 @@
 //! What each ingredient of `--set` changes in the built-in operation, and what it costs.
 //!
 //! # Theory
-//! The table of keys (`trepan_simulator::variants`) gives the values. Each is run alone against
-//! the default, along the default's path of the hand and on its mesh, tick by tick:
+//! The default is what `--quality auto` runs, on the sizes of `usual`, which are the same on every
+//! machine. The table of keys (`trepan_simulator::variants`) gives the values; one that the default
+//! has is left out instead. Each is run alone against the default, along its path of the hand and
+//! on its mesh, tick by tick:
 //!
 //! ```text
 //! default ──> force at the hand, shown surface, pictures ─┐
@@ -39,19 +41,22 @@ use anyhow::Result;
 use change::Change;
 use pictures::Pictures;
 use std::sync::Mutex;
+use trepan_budget::Quality;
 use trepan_render::Image;
-use trepan_simulator::{Effect, Variant, realistic, variants};
+use trepan_simulator::{Effect, Variant, of_quality, realistic, variants};
 
 /// What the rows are called.
 const SCENE: &str = "drill, open, press the brain";
-/// Setup that every run changes by one value.
-const DEFAULT: &str = "--quality usual";
+/// Sizes of every run, the same on every machine.
+const SIZES: &str = "--quality usual";
 /// Name of the second run of the default.
 const AGAIN: &str = "default, again";
 /// Name of the run with every value that physical realism asks for.
 const TOGETHER: &str = "all that realism asks for";
-/// Settings of a row: what it may change, and why it did not run.
+/// Settings of a row: what it may change, whether it leaves out what the default has, and why it did
+/// not run.
 const EFFECT: &str = "effect";
+const LEFT_OUT: &str = "left out";
 const NOT_RUN: &str = "not run";
 
 /// One run beside the default.
@@ -59,17 +64,28 @@ struct Candidate {
     name: String,
     settings: Vec<String>,
     effect: Effect,
+    left_out: bool,
 }
 
 impl Candidate {
+    /// The default with a value, or without one that it has.
     fn alone(variant: &Variant) -> Self {
-        Self { name: variant.setting(), settings: vec![variant.setting()], effect: variant.effect }
+        let left_out = of_quality(Quality::Auto).contains(variant);
+        let usual = variant.usual().filter(|_| left_out);
+        let setting = usual.as_ref().unwrap_or(variant).setting();
+        Self { name: setting.clone(), settings: vec![setting], effect: variant.effect, left_out }
     }
 
     fn flags(&self) -> String {
         let set = self.settings.iter().map(|setting| format!(" --set {setting}"));
-        DEFAULT.to_string() + &set.collect::<String>()
+        default_flags() + &set.collect::<String>()
     }
+}
+
+/// Flags of the default.
+fn default_flags() -> String {
+    let set = of_quality(Quality::Auto).into_iter().map(|variant| format!(" --set {}", variant.setting()));
+    SIZES.to_string() + &set.collect::<String>()
 }
 
 /// Every run: in a quick one the first value of each key.
@@ -79,10 +95,10 @@ fn candidates(scope: Scope) -> Vec<Candidate> {
         alone.dedup_by_key(|variant| variant.key);
     }
     let together = realistic().iter().map(Variant::setting).collect();
-    [Candidate { name: AGAIN.into(), settings: Vec::new(), effect: Effect::Cost }]
+    [Candidate { name: AGAIN.into(), settings: Vec::new(), effect: Effect::Cost, left_out: false }]
         .into_iter()
         .chain(alone.iter().map(Candidate::alone))
-        .chain([Candidate { name: TOGETHER.into(), settings: together, effect: Effect::Model }])
+        .chain([Candidate { name: TOGETHER.into(), settings: together, effect: Effect::Model, left_out: false }])
         .collect()
 }
 
@@ -108,7 +124,7 @@ impl Candidate {
             Effect::Rounding => "rounding",
             Effect::Cost => "cost",
         };
-        Row::new(SCENE, &*self.name).with("flags", self.flags()).with(EFFECT, effect)
+        Row::new(SCENE, &*self.name).with("flags", self.flags()).with(EFFECT, effect).with(LEFT_OUT, self.left_out)
     }
 }
 
@@ -132,7 +148,7 @@ static OF_DEFAULT: Mutex<Option<(Scope, Filmed)>> = Mutex::new(None);
 fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let mut kept = OF_DEFAULT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     if kept.as_ref().is_none_or(|(of, _)| *of != scope) {
-        *kept = Some((scope, Filmed::run(scope, Prepared::open(scope, DEFAULT, None)?)?));
+        *kept = Some((scope, Filmed::run(scope, Prepared::open(scope, &default_flags(), None)?)?));
     }
     let (_, usual) = kept.as_ref().expect("it was just made");
     let prepared = Prepared::open(scope, &candidate.flags(), Some(usual.ride.site))?;
@@ -181,12 +197,14 @@ mod tests {
         };
         let (quick, full) = (names(true), names(false));
         assert_eq!(full.len(), variants().len() + 2);
-        assert!(variants().iter().all(|variant| full.contains(&variant.setting())));
+        let run = |variant: &Variant| full.contains(&Candidate::alone(variant).name);
+        assert!(variants().iter().all(run) && full.contains(&"element=plain".into()), "{full:?}");
         let keys: BTreeSet<&str> = variants().iter().map(|variant| variant.key).collect();
         assert_eq!(quick.len(), keys.len() + 2);
         assert!(keys.iter().all(|key| quick.iter().any(|name| name.starts_with(&format!("{key}=")))));
         let together = candidates(Scope { quick: true, seed: 1 }).pop().unwrap();
-        assert_eq!(together.flags().matches("--set ").count(), realistic().len());
+        let default = of_quality(Quality::Auto).len();
+        assert_eq!(together.flags().matches("--set ").count(), default + realistic().len());
         assert!(together.flags().contains("--set element=locking-free"), "{}", together.flags());
     }
 
