@@ -268,7 +268,7 @@ mod tests {
         for device in [SolverDevice::Gpu, SolverDevice::Fastest] {
             let (is, ran) = pressed(&Ingredients { device, ..plain.clone() });
             let on_card = ran.device == SolverDevice::Gpu;
-            let is_card = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).is_ok_and(|gpu| !gpu.is_software());
+            let is_card = Gpu::open(Prefer::Hardware).is_ok_and(|gpu| !gpu.is_software());
             assert!(!on_card || is_card, "a software driver was taken");
             assert!((is[1] / usual[1] - 1.0).abs() < if on_card { 1e-3 } else { 1e-9 });
             let remarks = ran.remarks();

@@ -5,7 +5,6 @@ use crate::case::identity::{self, Identity, USERS};
 use crate::case::import::{PendingCase, volume_mm3};
 use crate::case::{Case, Inputs, folder, import};
 use crate::error::SessionError;
-use crate::measure::CaseErrors;
 use crate::models::{self, Facts, ModelRequest, Models};
 use crate::options::{Options, Patient};
 use crate::program::Program;
@@ -27,7 +26,7 @@ pub(crate) fn open_case(
         let case = fitting(program, folder::load(folder)?)?;
         let classes = case.brain.as_ref().map(|brain| &brain.classes.data);
         check_forbidden(options, |class| classes.is_some_and(|classes| classes.contains(&class.code())))?;
-        let models = on_case(request, &case, card)?;
+        let models = on_case(request, &case, &Cache::of(&options.patient)?, card)?;
         models.log();
         return Ok((case, models));
     }
@@ -92,7 +91,7 @@ pub(crate) fn plan_case(
     match case {
         Some(folder) => {
             let case = fitting(program, folder::load(folder)?)?;
-            Ok(PlannedCase { models: on_case(request, &case, card)?, notes: case.notes })
+            Ok(PlannedCase { models: on_case(request, &case, &Cache::of(patient)?, card)?, notes: case.notes })
         }
         None => {
             let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of(patient)?);
@@ -107,14 +106,18 @@ pub(crate) fn plan_case(
 }
 
 /// Models for a case folder.
-fn on_case(request: ModelRequest, case: &Case, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
+fn on_case(
+    request: ModelRequest,
+    case: &Case,
+    cache: &Cache,
+    card: impl FnOnce() -> bool,
+) -> Result<Models, SessionError> {
     let request = case.recipe.iter().fold(request, ModelRequest::on);
     let facts = Facts {
         ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
         brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
     };
-    // A case folder lacks the original images, so that errors come from the power laws.
-    request.settle(&facts, card, |_, _, _| Ok(CaseErrors::default()))
+    request.settle(&facts, card, |scene, rows, element| import::errors_in(case, cache, scene, rows, element))
 }
 
 /// A case that was built in a folder.

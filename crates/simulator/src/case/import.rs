@@ -143,12 +143,44 @@ impl<'a> PendingCase<'a> {
         let (opening, sight) = sight.flatten().unzip();
         // Other tissues may change what counts as brain.
         self.opening = opening.filter(|_| self.inputs.tissues.is_empty() && self.program.has_bone());
-        let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let errors =
-            sight.map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, element, threads));
+        let errors = sight.map_or_else(CaseErrors::default, |sight| measured(&sight, scene, rows, element));
         store(&errors, self.cache, &key, ERRORS);
         Ok(errors)
     }
+}
+
+fn measured(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> CaseErrors {
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    CaseErrors::of(sight, scene, rows, element, threads)
+}
+
+/// Errors of these choices in the case of a folder, from the cache if measured before. Its skull
+/// stands in for the CT, so that what resampling lost is not counted.
+pub(super) fn errors_in(
+    case: &Case,
+    cache: &Cache,
+    scene: &Scene,
+    rows: &Rows,
+    element: Element,
+) -> Result<CaseErrors, SessionError> {
+    let Some(opening) = case.opening else { return Ok(CaseErrors::default()) };
+    let key = cache.under(&case.hash, &CaseErrors::about(scene, rows, element));
+    if let Some(errors) = cached(cache, &key, ERRORS) {
+        return Ok(errors);
+    }
+    let of_bone = |ct: &VoxelVolume<i16>| {
+        let bone = Arc::new(bone_of(ct, case.isovalue_hu)?);
+        Ok::<_, SessionError>((Skull { ct: ct.clone(), isovalue: case.isovalue_hu }, bone))
+    };
+    let skull = case.skull.as_ref().map(of_bone).transpose()?;
+    let shape =
+        |mask: &VoxelVolume<u8>| Shape { field: Inside::of(mask).field, mask: mask.clone(), material: scene.material };
+    let brain = case.brain.as_ref().map(|brain| (shape(&brain.classes), opening.brain()));
+    let site = Site::from(opening);
+    let sight = Sight { skull, entry: site.entry, outward: -site.inward, eye: eye(&site), brain };
+    let errors = measured(&sight, scene, rows, element);
+    store(&errors, cache, &key, ERRORS);
+    Ok(errors)
 }
 
 /// The opening on voxels of 1 mm, and skull, brain and first view there, to measure errors on;
@@ -288,7 +320,7 @@ fn build(
     };
     stages.next("meshing the brain");
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
-    let place = opening.or_else(bare).map(|opening| opening.brain());
+    let place = opening.or_else(bare);
     let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, place, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }

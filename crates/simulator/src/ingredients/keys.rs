@@ -19,7 +19,8 @@ pub struct Key {
     /// Values of qualities that differ from it: those that change more than the tolerance in the
     /// built-in operation, and run in time (`validate ablation`).
     pub presets: &'static [(Quality, &'static str)],
-    /// Why no quality takes another value than the default, where realism asks for one.
+    /// Why no quality takes another value than the default, though one changes more or realism asks
+    /// for it.
     pub left_out: Option<&'static str>,
     /// Model that it belongs to.
     pub part: Part,
@@ -110,8 +111,8 @@ pub const KEYS: &[Key] = &[
         name: "bone-friction",
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction on bone of a tool that does not cut",
-        left_out: Some("changes 0.95 of the tolerance there"),
         usual: Some("off"),
+        presets: &[(Quality::Auto, FRICTION_ON_BONE), (Quality::Fine, FRICTION_ON_BONE)],
         compared: || vec![FRICTION_ON_BONE.into()],
         realistic: Some(FRICTION_ON_BONE),
         get: |i| Some(off_or(i.bone_friction)),
@@ -173,6 +174,7 @@ pub const KEYS: &[Key] = &[
             format!("{}; law.CLASS for one of {}", names::<Law>(), list(TissueClass::ALL.map(TissueClass::name)))
         },
         about: "constitutive law at the same moduli; without CLASS of all tissue, not of the ventricles' fluid",
+        left_out: Some("ogden changes 2.0 of the tolerance there, and takes 2.8 cores more"),
         usual: Some("neo-hookean"),
         compared: || others::<Law>().into_iter().rev().collect(),
         get: |i| Some(laws(&i.laws)),
@@ -219,6 +221,7 @@ pub const KEYS: &[Key] = &[
         name: "surface-pressure",
         values: || "off, or up to 60 mmHg".into(),
         about: "fluid pressure on the brain's surface and in the ventricles; the brain starts at rest under it",
+        left_out: Some("a state of the patient, to be given: 10 mmHg change 14 times the tolerance there"),
         usual: Some("off"),
         compared: || vec!["10".into()],
         get: |i| Some(off_or(i.surface_pressure_mmhg)),

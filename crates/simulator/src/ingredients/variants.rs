@@ -1,6 +1,6 @@
 //! Values of the keys that a comparison runs beside the default.
 
-use super::keys::{Effect, KEYS, Key};
+use super::keys::{Effect, KEYS, Key, Part};
 use trepan_budget::Quality;
 
 /// A value of a key beside the default.
@@ -18,6 +18,11 @@ impl Variant {
     /// The argument of `--set`.
     pub fn setting(&self) -> String {
         format!("{}={}", self.key, self.value)
+    }
+
+    /// Whether it means nothing to another solver than `tled`.
+    pub fn is_of_tled(&self) -> bool {
+        KEYS.iter().any(|key| key.name == self.key && key.part == Part::Tled)
     }
 
     /// The same key with its usual value, where it has one.

@@ -2,16 +2,16 @@
 //! presses into the brain and slides.
 //!
 //! # Theory
-//! The tool's tip is a ball that penetrates the rest shape by the depth of the scene, at most up to
-//! its equator. On every mesh a spring presses each triangle under the ball to the ball's depth
+//! The tool's tip is a ball that enters the mask's surface by the depth of the scene, at most up to
+//! its equator. On every mesh a spring presses each triangle under the ball to the ball's surface
 //! there. (A single spring on the mean of all triangles sinks deeper on finer meshes; a flat tip
 //! shears the tissue at its rim without bound.)
 //!
 //! The ground truth is TLED with averaged nodal pressure and no sleeping elements, on a mesh with a
-//! sixteenth of the edge length under the ball. The error is the distance between the positions of
-//! material points near the opening on both meshes, at the end of push and slide: its 95th
-//! percentile over the points. That of the tool's force is taken at the same times; the worse one
-//! counts.
+//! sixteenth of the edge length under the ball. The error is the distance from its surface within
+//! 5 mm of the tool to the surface of the mesh, at the end of push and slide: its 95th percentile.
+//! It holds what the mesh's shape lacks at rest, too. That of the tool's force is taken at the same
+//! times; the worse one counts.
 //!
 //! The cost of TLED is counted: 1 per tetrahedron and step, 0.1 for a sleeping one, times the
 //! expected stable time step for this number of tetrahedra over the mesh's. The cost of the other
@@ -21,7 +21,7 @@ use super::bone::Slide;
 use crate::error::SessionError;
 use crate::ingredients::Element;
 use crate::run::clock::Clock;
-use parry3d::query::PointQueryWithLocation;
+use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::TriMesh;
 use std::collections::BTreeMap;
 use trepan_budget::{Scene, Tissue, TissueForce, dt_ms};
@@ -33,14 +33,13 @@ use trepan_tled::{Config, Damping, Tled};
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Tetrahedra of the whole brain.
-const TETS: [usize; 7] = [3_000, 5_000, 8_000, 12_000, 20_000, 30_000, 50_000];
+const TETS: [usize; 3] = [3_000, 8_000, 20_000];
 /// Meshes refined at the opening: tetrahedra of the whole brain, and halvings of the edge length
 /// there.
-const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [1, 2]);
-/// Meshes with a region of interest, and the motion below which tissue sleeps, mm.
-const STILL: ([usize; 2], f64) = ([5_000, 12_000], 0.01);
-/// Meshes that the other solvers can step in real time.
-const RIVALS_TETS: [usize; 1] = [3_000];
+const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [2, 3]);
+/// A mesh that the other solvers can step in real time.
+const RIVALS_TETS: usize = 3_000;
+
 /// Resolution of a mesh: tetrahedra of the whole brain, and the refinement around a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
@@ -48,24 +47,36 @@ pub struct Fineness {
     pub tets: usize,
     /// Halvings of the edge length.
     pub halvings: u32,
-    /// Radius of the refined region, mm.
+    /// Refined region: a ball of this radius, mm, with its centre so far above the surface.
     pub radius_mm: f32,
+    /// See above.
+    pub above_mm: f32,
 }
 
 impl Fineness {
     /// Ground truth for validation.
-    pub const JUDGE: Self = Self { tets: 50_000, halvings: 4, radius_mm: 8.0 };
+    pub const JUDGE: Self = Self { tets: 50_000, halvings: 4, radius_mm: 8.0, above_mm: 0.0 };
     /// Ground truth that a session computes at its start.
-    pub const QUICK: Self = Self { tets: 25_000, halvings: 4, radius_mm: 8.0 };
+    pub const QUICK: Self = Self { tets: 25_000, halvings: 4, radius_mm: 8.0, above_mm: 0.0 };
 
     /// Resolution of a mesh that a session can step.
     pub const fn stepped(tets: usize, halvings: u32) -> Self {
-        Self { tets, halvings, radius_mm: OPENING_MM }
+        let [wide, deep] = OPENING_MM;
+        let radius_mm = (wide * wide + deep * deep) / (2.0 * deep);
+        Self { tets, halvings, radius_mm, above_mm: radius_mm - deep }
+    }
+
+    /// The refined region at a place of the surface.
+    pub fn fine(&self, place: Vec3, outward: Vec3) -> Option<lattice::Fine> {
+        let Self { halvings, radius_mm, above_mm, .. } = *self;
+        let fine = lattice::Fine { centre: place + above_mm * outward, radius_mm, halvings };
+        Some(fine).filter(|_| halvings > 0)
     }
 }
 
-/// Radius of the refined region in a session's mesh, mm.
-pub const OPENING_MM: f32 = 10.0;
+/// Radius on the surface and depth of the refined region in a session's mesh, mm. Deeper down a
+/// probe of 2 mm strains too little to need small elements.
+const OPENING_MM: [f32; 2] = [10.0, 6.0];
 /// Largest mass that mass scaling adds, as a share of the brain's mass; the weight is unchanged. It
 /// is added to the elements with the shortest stable time steps: slivers and refined ones.
 pub const MASS_ADDED: f32 = 0.01;
@@ -84,8 +95,9 @@ const TIMES_MS: [f32; 3] = [120.0, 40.0, 120.0];
 const TURN_MS: f32 = 8.0;
 /// Longest time step, ms: of explicit solvers, of the implicit solver.
 const LONGEST_MS: [f32; 2] = [1.0, 4.0];
-/// Spacing of the evaluated points, and their largest distance from the opening, mm.
-const POINTS_MM: [f32; 2] = [3.5, 14.0];
+/// Radius around the tool within which the surface is compared, mm, as wide as a burr hole; and
+/// number of places.
+const LOOK: (f32, u32) = (5.0, 150);
 /// Motion below which a push does not distinguish meshes, mm.
 pub const LEAST_MM: f64 = 0.1;
 /// Share of the brain's height below which its surface nodes are fixed.
@@ -93,15 +105,12 @@ const FIXED_SHARE: f32 = 0.35;
 
 /// All choices for tissue.
 pub fn choices() -> Vec<Tissue> {
-    let choice = |solver, tets, still_mm| Tissue { solver, tets, halvings: 0, still_mm };
-    let refined = |halvings| FINER.0.map(|tets| Tissue { halvings, ..choice("tled", tets, 0.0) });
+    let choice = |solver, tets| Tissue { solver, tets, halvings: 0, still_mm: 0.0 };
+    let refined = |halvings| FINER.0.map(|tets| Tissue { halvings, ..choice("tled", tets) });
     let names = Method::all().into_iter().filter(|m| !m.descriptor().is_static).map(|m| m.name());
-    let rivals = names.flat_map(|solver| RIVALS_TETS.map(|tets| choice(solver, tets, 0.0)));
-    let tled = TETS.map(|tets| choice("tled", tets, 0.0)).into_iter();
-    tled.chain(FINER.1.into_iter().flat_map(refined))
-        .chain(STILL.0.map(|tets| choice("tled", tets, STILL.1)))
-        .chain(rivals)
-        .collect()
+    let rivals = names.map(|solver| choice(solver, RIVALS_TETS));
+    let tled = TETS.map(|tets| choice("tled", tets)).into_iter();
+    tled.chain(FINER.1.into_iter().flat_map(refined)).chain(rivals).collect()
 }
 
 /// Measured error and cost of a choice.
@@ -133,7 +142,7 @@ pub fn cost(at: usize, choices: &[Tissue], found: &[Measurement], scene: &Scene)
 /// Index of the choice that other solvers are compared with: TLED as the machine's measure steps
 /// it.
 fn unit(choices: &[Tissue]) -> usize {
-    let is = |c: &Tissue| (c.solver, c.tets, c.halvings, c.still_mm) == ("tled", RIVALS_TETS[0], 0, 0.0);
+    let is = |c: &Tissue| (c.solver, c.tets, c.halvings, c.still_mm) == ("tled", RIVALS_TETS, 0, 0.0);
     choices.iter().position(is).expect("it is a choice")
 }
 
@@ -239,19 +248,19 @@ impl Solver for Box<dyn SoftSolver> {
     }
 }
 
-/// A push of the tool, with the ground-truth displacements of the tissue.
+/// A push of the tool, with the ground truth of what the hand feels and the eye sees.
 pub struct Push {
     slide: Slide,
     normal: Vec3,
-    points: Vec<Vec3>,
+    /// Ends of the slide on the mask's surface.
+    ends: [Vec3; 2],
     truth: Pushed,
 }
 
 /// What a push did to the tissue.
-#[derive(Clone, Debug, Default)]
 struct Pushed {
-    /// Displacements of the points at the end of push and slide, mm.
-    moved: Vec<Vec3>,
+    /// The surface at rest around the slide, and at the end of push and slide.
+    surfaces: [Surroundings; 3],
     /// Force of the tool at the end of each, N.
     forces_n: [f64; 2],
     /// Mean work of a step, as a share of one with all tetrahedra awake.
@@ -275,17 +284,13 @@ impl Push {
             shape.field.gradient(slide.place + 4.0 * (turn.cos() * a + turn.sin() * b))
         };
         let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
-        let mut push = Self { slide: *slide, normal, points: points(shape, slide.place), truth: Pushed::default() };
-        let mesh = push.refined(shape, truth, 0.5)?;
-        push.truth = push.run(&mesh, &mut brains.tled_with_pressure(&mesh, true)?, LONGEST_MS[0])?;
-        Ok(push)
-    }
-
-    /// Builds a mesh refined around a point of the slide.
-    fn refined(&self, shape: &Shape, fineness: Fineness, way: f32) -> Result<TetMesh, SessionError> {
-        let Fineness { tets, halvings, radius_mm } = fineness;
-        let fine = lattice::Fine { centre: self.on_way(way), radius_mm, halvings };
-        meshed(shape, tets, Some(fine).filter(|_| halvings > 0))
+        let on_surface = |p: Vec3| (0..4).fold(p, |p, _| p - shape.field.sample(p) * normal);
+        let ends = [0.0, slide.length_mm].map(|mm| on_surface(slide.place + mm * slide.along(normal)));
+        let middle = 0.5 * (ends[0] + ends[1]);
+        let mesh = refined(shape, truth, middle, normal)?;
+        let solver = &mut brains.tled_with_pressure(&mesh, true)?;
+        let truth = run(slide, normal, ends, &mesh, solver, LONGEST_MS[0])?;
+        Ok(Self { slide: *slide, normal, ends, truth })
     }
 
     /// Measures TLED on a mesh refined at the opening, with or without averaged nodal pressure.
@@ -298,7 +303,7 @@ impl Push {
         fineness: Fineness,
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
-        let mesh = self.refined(brains.shape, fineness, 0.0)?;
+        let mesh = refined(brains.shape, fineness, self.ends[0], self.normal)?;
         self.found(&mesh, &mut brains.tled_with_pressure(&mesh, averaged_pressure)?, LONGEST_MS[0])
     }
 
@@ -309,7 +314,8 @@ impl Push {
     pub fn measure(&self, brains: &Brains) -> Result<Vec<Measurement>, SessionError> {
         let one = |choice: &Tissue| {
             let (tets, halvings) = (choice.tets, choice.halvings);
-            let refined = (halvings > 0).then(|| self.refined(brains.shape, Fineness::stepped(tets, halvings), 0.0));
+            let refined = (halvings > 0)
+                .then(|| refined(brains.shape, Fineness::stepped(tets, halvings), self.ends[0], self.normal));
             let refined = refined.transpose()?;
             let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
             let mesh = refined.as_ref().or_else(alike).ok_or_else(|| brain_error("a mesh is missing"))?;
@@ -320,24 +326,39 @@ impl Push {
     }
 
     fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Result<Measurement, SessionError> {
-        let found = self.run(mesh, solver, longest_ms)?;
+        let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
         let Pushed { awake, dt_ms, ns, .. } = found;
         Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), awake, dt_ms, ns })
     }
 
-    /// Distance of this ground truth from a finer one, 95th percentile over the points, mm.
+    /// Distance of this ground truth from a finer one, 95th percentile over the places, mm.
     pub fn apart_mm(&self, finer: &Self) -> f64 {
         self.error_mm(&finer.truth)
     }
 
-    /// Largest displacement of a point, mm; 0 if the tool meets fixed tissue or none.
+    /// Largest displacement of a place, mm; 0 if the tool meets fixed tissue or none.
     pub fn moved_mm(&self) -> f64 {
-        self.truth.moved.iter().map(|moved| f64::from(moved.length())).fold(0.0, f64::max)
+        let [rest, pushed, slid] = &self.truth.surfaces;
+        let moved = |end: usize, to: &Surroundings| {
+            let nodes = self.seen(end).map(|place| rest.under(place).1);
+            nodes.map(|nodes| f64::from(to.at(nodes).distance(rest.at(nodes)))).fold(0.0, f64::max)
+        };
+        moved(0, pushed).max(moved(1, slid))
+    }
+
+    /// Places over the surface around the tool at an end of the slide: the hole that one sees
+    /// through.
+    fn seen(&self, end: usize) -> impl Iterator<Item = Vec3> {
+        disc(LOOK.0, LOOK.1, self.normal).map(move |aside| self.ends[end] + aside)
     }
 
     fn error_mm(&self, found: &Pushed) -> f64 {
-        let apart = found.moved.iter().zip(&self.truth.moved).map(|(a, b)| f64::from(a.distance(*b)));
-        quantile(&mut apart.collect::<Vec<_>>(), 0.95)
+        let [rest, truth @ ..] = &self.truth.surfaces;
+        let apart = |end: usize| {
+            let places = self.seen(end).map(move |place| truth[end].at(rest.under(place).1));
+            places.map(move |place| f64::from(found.surfaces[end + 1].0.distance_to_local_point(place, false)))
+        };
+        quantile(&mut apart(0).chain(apart(1)).collect::<Vec<_>>(), 0.95)
     }
 
     fn force(&self, found: &Pushed) -> TissueForce {
@@ -346,73 +367,95 @@ impl Push {
         let of = |force: &TissueForce| force.error_n / force.force_n.max(1e-6);
         apart.max_by(|a, b| of(a).total_cmp(&of(b))).expect("there are two")
     }
+}
 
-    /// Runs push and slide.
-    fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Result<Pushed, SessionError> {
-        let (locations, touch) = (locate(mesh, &self.points), Touch::of(mesh, self.slide.place)?);
-        let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
-        let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
-        let (mut moved, mut forces_n) = (Vec::new(), [0.0; 2]);
-        let (mut work, mut steps, mut step_ms) = (0.0, 0u32, 0.0);
-        let ends = [TIMES_MS[0] + TIMES_MS[1], TIMES_MS.iter().sum()];
-        let (mut now, mut next) = (0.0f32, 0.0f32);
-        for (end, force_n) in ends.into_iter().zip(&mut forces_n) {
-            while now < end {
-                if now >= next {
-                    self.press(mesh, &touch, now, &mut loads.contacts);
-                    next += TURN_MS;
-                }
-                let clock = Clock::start();
-                solver.seam().step(&loads, dt_ms);
-                step_ms += clock.now_ms();
-                work += solver.work();
-                (steps, now) = (steps + 1, now + dt_ms);
+/// Builds a mesh refined around a place.
+fn refined(shape: &Shape, fineness: Fineness, place: Vec3, normal: Vec3) -> Result<TetMesh, SessionError> {
+    meshed(shape, fineness.tets, fineness.fine(place, normal))
+}
+
+/// Runs push and slide.
+fn run(
+    slide: &Slide,
+    normal: Vec3,
+    ends: [Vec3; 2],
+    mesh: &TetMesh,
+    solver: &mut dyn Solver,
+    longest_ms: f32,
+) -> Result<Pushed, SessionError> {
+    let rest = Surroundings::of(mesh, ends[0])?;
+    let ball = Ball { slide, normal, ends };
+    let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
+    let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
+    let (mut surfaces, mut forces_n) = (vec![rest], [0.0; 2]);
+    let (mut work, mut steps, mut step_ms) = (0.0, 0u32, 0.0);
+    let stops = [TIMES_MS[0] + TIMES_MS[1], TIMES_MS.iter().sum()];
+    let (mut now, mut next) = (0.0f32, 0.0f32);
+    for (stop, force_n) in stops.into_iter().zip(&mut forces_n) {
+        while now < stop {
+            if now >= next {
+                ball.press(&surfaces[0], now, &mut loads.contacts);
+                next += TURN_MS;
             }
-            let positions = solver.seam().positions();
-            let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
-            *force_n = loads.contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum();
-            moved.extend(
-                locations.iter().zip(&self.points).map(|(location, point)| location.place(mesh, positions) - *point),
-            );
+            let clock = Clock::start();
+            solver.seam().step(&loads, dt_ms);
+            step_ms += clock.now_ms();
+            work += solver.work();
+            (steps, now) = (steps + 1, now + dt_ms);
         }
-        let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
-        Ok(Pushed { moved, forces_n, awake: work / f64::from(steps), dt_ms: dt_ms.into(), ns })
+        let positions = solver.seam().positions();
+        let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
+        *force_n = loads.contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum();
+        surfaces.push(surfaces[0].moved(positions)?);
     }
+    let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
+    let surfaces = surfaces.try_into().unwrap_or_else(|_| unreachable!("at rest and at two ends"));
+    Ok(Pushed { surfaces, forces_n, awake: work / f64::from(steps), dt_ms: dt_ms.into(), ns })
+}
 
-    /// Point of the slide at a share of its length.
-    fn on_way(&self, share: f32) -> Vec3 {
-        self.slide.place + share * self.slide.length_mm * self.slide.along(self.normal)
-    }
+/// The tip of the tool on its way: down at one end of the slide, then straight to the other.
+struct Ball<'a> {
+    slide: &'a Slide,
+    normal: Vec3,
+    ends: [Vec3; 2],
+}
 
-    /// Contacts of the tool at a time: a spring on each triangle under the ball, to the ball's
-    /// depth there.
-    fn press(&self, mesh: &TetMesh, touch: &Touch, now_ms: f32, out: &mut NodalContacts) {
+impl Ball<'_> {
+    /// Contacts at a time: a spring on each triangle under the ball, to the ball's surface there.
+    fn press(&self, rest: &Surroundings, now_ms: f32, out: &mut NodalContacts) {
         let (scene, way) = (&self.slide.scene, (now_ms - TIMES_MS[0] - TIMES_MS[1]) / TIMES_MS[2]);
-        let (middle, radius) = (self.on_way(way.clamp(0.0, 1.0)), scene.probe_radius_mm as f32);
+        let radius = scene.probe_radius_mm as f32;
         let in_share = (now_ms / TIMES_MS[0]).min(1.0);
         let depth = scene.tissue_motion_mm as f32 * in_share * in_share * (3.0 - 2.0 * in_share);
-        let (a, b) = self.normal.any_orthonormal_pair();
-        // Per triangle: the spring, the sum of the ball's depths, and their number.
+        let middle = self.ends[0].lerp(self.ends[1], way.clamp(0.0, 1.0));
+        // Per triangle: the spring, the sum of the ball's heights, and their number.
         let mut pressed: BTreeMap<usize, (NodalContact, f32, f32)> = BTreeMap::new();
-        for n in 0..PLACES {
-            // Sunflower points: evenly distributed over a disc.
-            let far = ((n as f32 + 0.5) / PLACES as f32).sqrt() * WIDTH * radius;
-            let turn = n as f32 * 2.399_963;
-            let (triangle, nodes) = touch.under(middle + far * (turn.cos() * a + turn.sin() * b));
-            let (spring, deep, places) = pressed.entry(triangle).or_default();
+        for aside in disc(WIDTH * radius, PLACES, self.normal) {
+            let (triangle, nodes) = rest.under(middle + aside);
+            let (spring, height, places) = pressed.entry(triangle).or_default();
             nodes.into_iter().for_each(|(node, weight)| spring.add(node, weight));
-            *deep += depth - (radius - (radius * radius - far * far).sqrt());
+            *height += middle.dot(self.normal) - depth + radius - (radius * radius - aside.length_squared()).sqrt();
             *places += 1.0;
         }
         out.clear();
-        for (mut spring, deep, places) in pressed.into_values() {
+        for (mut spring, height, places) in pressed.into_values() {
             spring.normalise();
-            let (rest, share) = (spring.mean(|n| mesh.positions[n as usize]).dot(self.normal), places / PLACES as f32);
-            (spring.normal, spring.offset_mm) = (self.normal, deep / places - rest);
+            let share = places / PLACES as f32;
+            (spring.normal, spring.offset_mm) = (self.normal, -height / places);
             (spring.stiffness, spring.damping) = (share * SPRINGS.0, share * SPRINGS.1);
             out.push(spring);
         }
     }
+}
+
+/// Points of a disc, evenly distributed as in a sunflower.
+fn disc(radius: f32, count: u32, normal: Vec3) -> impl Iterator<Item = Vec3> {
+    let (a, b) = normal.any_orthonormal_pair();
+    (0..count).map(move |n| {
+        let far = ((n as f32 + 0.5) / count as f32).sqrt() * radius;
+        let turn = n as f32 * 2.399_963;
+        far * (turn.cos() * a + turn.sin() * b)
+    })
 }
 
 /// Surface nodes of the lower part, which the skull supports.
@@ -422,25 +465,19 @@ fn fixed_nodes(mesh: &TetMesh) -> Vec<u32> {
     Surface::of(mesh).nodes().into_iter().filter(|&n| mesh.positions[n as usize].z <= top).collect()
 }
 
-/// Points of the brain around the opening, on a lattice.
-fn points(shape: &Shape, place: Vec3) -> Vec<Vec3> {
-    let [apart, reach] = POINTS_MM;
-    let n = (reach / apart) as i32;
-    let all = (0..(2 * n + 1).pow(3)).map(|at| {
-        let side = 2 * n + 1;
-        place + apart * glam::IVec3::new(at % side - n, at / side % side - n, at / (side * side) - n).as_vec3()
-    });
-    all.filter(|p| p.distance(place) <= reach && shape.field.sample(*p) < -0.5).collect()
-}
+/// The brain's surface around the slide.
+struct Surroundings(TriMesh);
 
-/// The brain's surface at rest near the opening.
-struct Touch(TriMesh);
-
-impl Touch {
+impl Surroundings {
     fn of(mesh: &TetMesh, place: Vec3) -> Result<Self, SessionError> {
         let near = |t: &[u32; 3]| t.iter().any(|&n| mesh.positions[n as usize].distance(place) < 40.0);
         let triangles: Vec<[u32; 3]> = Surface::of(mesh).triangles.into_iter().filter(near).collect();
         TriMesh::new(mesh.positions.clone(), triangles).map(Self).map_err(brain_error)
+    }
+
+    /// The same with its nodes elsewhere.
+    fn moved(&self, positions: &[Vec3]) -> Result<Self, SessionError> {
+        TriMesh::new(positions.to_vec(), self.0.indices().to_vec()).map(Self).map_err(brain_error)
     }
 
     /// Nearest triangle to a point, and the weights of its corners there.
@@ -450,42 +487,11 @@ impl Touch {
         let nodes = self.0.indices()[triangle as usize];
         (triangle as usize, [0, 1, 2].map(|corner| (nodes[corner], weights[corner])))
     }
-}
 
-/// Location of a point in a mesh: a tetrahedron and barycentric weights.
-struct Location {
-    tet: usize,
-    weights: [f32; 4],
-}
-
-impl Location {
-    fn place(&self, mesh: &TetMesh, positions: &[Vec3]) -> Vec3 {
-        mesh.tets[self.tet].iter().zip(self.weights).map(|(&n, w)| positions[n as usize] * w).sum()
+    /// The place with these weights of nodes.
+    fn at(&self, nodes: [(u32, f32); 3]) -> Vec3 {
+        nodes.into_iter().map(|(node, weight)| weight * self.0.vertices()[node as usize]).sum()
     }
-}
-
-/// Locates each point in the mesh; for a point outside, in the tetrahedron that it leaves least.
-fn locate(mesh: &TetMesh, points: &[Vec3]) -> Vec<Location> {
-    let middle = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
-    let reach = points.iter().map(|p| p.distance(middle)).fold(0.0, f32::max) + 25.0;
-    let near: Vec<(usize, [Vec3; 4])> =
-        (0..mesh.tets.len()).map(|t| (t, mesh.corners(t))).filter(|(_, c)| c[0].distance(middle) < reach).collect();
-    let location = |p: &Vec3| {
-        let of = |(t, c): &(usize, [Vec3; 4])| Location { tet: *t, weights: weights(*p, c) };
-        let least = |location: &Location| location.weights.iter().copied().fold(f32::INFINITY, f32::min);
-        near.iter().map(of).max_by(|a, b| least(a).total_cmp(&least(b))).expect("there is a mesh around the opening")
-    };
-    points.iter().map(location).collect()
-}
-
-fn weights(p: Vec3, [a, b, c, d]: &[Vec3; 4]) -> [f32; 4] {
-    let volume = |u: Vec3, v: Vec3, w: Vec3| u.cross(v).dot(w);
-    let whole = volume(*b - *a, *c - *a, *d - *a);
-    let q = p - *a;
-    let of_b = volume(q, *c - *a, *d - *a) / whole;
-    let of_c = volume(*b - *a, q, *d - *a) / whole;
-    let of_d = volume(*b - *a, *c - *a, q) / whole;
-    [1.0 - of_b - of_c - of_d, of_b, of_c, of_d]
 }
 
 #[cfg(test)]
@@ -493,20 +499,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_keeps_its_place_in_a_linear_field() {
-        let mesh = trepan_soft::boxes::split_box([3, 3, 3], Vec3::splat(30.0));
-        let points = [Vec3::new(4.0, 17.0, 26.0), Vec3::new(15.0, 15.0, 15.0), Vec3::new(29.0, 1.0, 31.0)];
-        let moved: Vec<Vec3> = mesh.positions.iter().map(|p| *p * 2.0 + Vec3::X).collect();
-        for (location, point) in locate(&mesh, &points).iter().zip(points) {
-            assert!(location.place(&mesh, &mesh.positions).distance(point) < 1e-4);
-            assert!(location.place(&mesh, &moved).distance(point * 2.0 + Vec3::X) < 1e-3);
-        }
-    }
-
-    #[test]
     fn what_is_under_the_tool_is_the_nearest_point_of_the_surface() {
         let mesh = trepan_soft::boxes::split_box([3, 3, 3], Vec3::splat(30.0));
-        let touch = Touch::of(&mesh, Vec3::splat(15.0)).unwrap();
+        let touch = Surroundings::of(&mesh, Vec3::splat(15.0)).unwrap();
         for (point, nearest) in [([12.0, 17.0, 33.0], [12.0, 17.0, 30.0]), ([-4.0, 31.0, 8.0], [0.0, 30.0, 8.0])] {
             let (_, nodes) = touch.under(Vec3::from(point));
             let found: Vec3 = nodes.iter().map(|(node, weight)| *weight * mesh.positions[*node as usize]).sum();

@@ -76,16 +76,18 @@ impl Candidate {
         Self { name: setting.clone(), settings: vec![setting], effect: variant.effect, left_out }
     }
 
+    /// Its flags: without what another solver than the default's does not have.
     fn flags(&self) -> String {
+        let is_rival = self.name.starts_with("solver=");
         let set = self.settings.iter().map(|setting| format!(" --set {setting}"));
-        default_flags() + &set.collect::<String>()
+        flags(|variant| !is_rival || !variant.is_of_tled()) + &set.collect::<String>()
     }
 }
 
-/// Flags of the default.
-fn default_flags() -> String {
-    let set = of_quality(Quality::Auto).into_iter().map(|variant| format!(" --set {}", variant.setting()));
-    SIZES.to_string() + &set.collect::<String>()
+/// Flags of the default, with those of its ingredients that are kept.
+fn flags(is_kept: impl Fn(&Variant) -> bool) -> String {
+    let kept = of_quality(Quality::Auto).into_iter().filter(is_kept);
+    SIZES.to_string() + &kept.map(|variant| format!(" --set {}", variant.setting())).collect::<String>()
 }
 
 /// Every run: in a quick one the first value of each key.
@@ -148,7 +150,7 @@ static OF_DEFAULT: Mutex<Option<(Scope, Filmed)>> = Mutex::new(None);
 fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let mut kept = OF_DEFAULT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     if kept.as_ref().is_none_or(|(of, _)| *of != scope) {
-        *kept = Some((scope, Filmed::run(scope, Prepared::open(scope, &default_flags(), None)?)?));
+        *kept = Some((scope, Filmed::run(scope, Prepared::open(scope, &flags(|_| true), None)?)?));
     }
     let (_, usual) = kept.as_ref().expect("it was just made");
     let prepared = Prepared::open(scope, &candidate.flags(), Some(usual.ride.site))?;

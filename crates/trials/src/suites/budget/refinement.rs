@@ -26,7 +26,7 @@ const QUICK_TETS: usize = 8_000;
 const MOST_HALVED: usize = 20_000;
 
 /// What the truth is held against: about half of its own edges under the tool.
-const FINER: Fineness = Fineness { tets: 200_000, halvings: 4, radius_mm: 6.0 };
+const FINER: Fineness = Fineness { tets: 200_000, halvings: 4, radius_mm: 6.0, above_mm: 0.0 };
 
 /// Error and cost of every mesh.
 pub fn run(scope: Scope, findings: &mut Findings) {

@@ -13,8 +13,7 @@ pub const EYES: usize = 3;
 /// How far the eye moves off where it was, as a share of its distance: up to 15 degrees.
 const MOVED: f32 = 0.25;
 
-/// Machine for which choices are priced: enough threads that time never decides, so that accuracy
-/// does.
+/// Machine of which a scene's is a multiple in speed; with enough threads that time never decides.
 pub const MACHINE: Machine = Machine {
     ns_per_tet_step: 13.0,
     us_per_rigid_tick: 6.0,
@@ -24,11 +23,17 @@ pub const MACHINE: Machine = Machine {
     device_draws: false,
 };
 
+/// Threads that a scene's machine may have, and how many times slower than [`MACHINE`] it may be.
+const THREADS: [u32; 5] = [1, 2, 4, 8, 16];
+const SLOWER: [f64; 2] = [0.5, 8.0];
+
 /// What is done where.
 #[derive(Clone, Debug)]
 pub struct Situation {
     /// What the plan is told.
     pub scene: Scene,
+    /// Machine that it plans for.
+    pub machine: Machine,
     /// Direction of the opening from the middle of the head.
     pub towards: Vec3,
     /// Where the opening is on bone.
@@ -79,7 +84,15 @@ impl Situation {
         let turned = |n: usize| glam::Quat::from_axis_angle(eye, core::f32::consts::TAU * n as f32 / EYES as f32);
         let eyes_later = core::array::from_fn(|n| eye + MOVED * (turned(n) * aside));
         let turn_rad = random.f32() * core::f32::consts::TAU;
-        Self { scene, towards, bone_site, turn_rad, slide_mm, eye, eyes_later }
+        let times = SLOWER[0] * (SLOWER[1] / SLOWER[0]).powf(random.f64());
+        let machine = Machine {
+            ns_per_tet_step: times * MACHINE.ns_per_tet_step,
+            us_per_rigid_tick: times * MACHINE.us_per_rigid_tick,
+            ns_per_ray: times * MACHINE.ns_per_ray,
+            threads: THREADS[random.usize(..THREADS.len())],
+            ..MACHINE
+        };
+        Self { scene, machine, towards, bone_site, turn_rad, slide_mm, eye, eyes_later }
     }
 
     /// The burr's way over the bone.

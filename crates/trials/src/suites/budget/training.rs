@@ -4,10 +4,10 @@
 use super::case::{Case, Source};
 use super::scene::Situation;
 use serde::{Deserialize, Serialize};
-use trepan_budget::{Bone, FEATURES, Kind, Picture, PowerLaw, Row, Tissue, write};
+use trepan_budget::{Bone, FEATURES, Kind, Picture, PowerLaw, Quality, Row, Tissue, write};
+use trepan_simulator::Ingredients;
 use trepan_simulator::measure::tissue::{self, Brains, Fineness, Push};
 use trepan_simulator::measure::{self, Wanted, bone, picture};
-use trepan_simulator::{Element, Ingredients};
 
 /// Random numbers of training: far from those of the scenes that are judged.
 const SEED: u64 = 0x7472_6169_6e00;
@@ -55,8 +55,9 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
     let mut random = fastrand::Rng::with_seed(SEED + part as u64);
     let case = Case::of(PARTS[part], &mut random);
     let (bones, tissues, pictures) = (bone::choices(), tissue::choices(), picture::choices());
-    let brains = (part < WITH_TISSUE && with_tissue)
-        .then(|| Brains::of(&case.brain, &tissues, Element::Plain).expect("the brain can be filled"));
+    let brains = (part < WITH_TISSUE && with_tissue).then(|| {
+        Brains::of(&case.brain, &tissues, Ingredients::of(Quality::Auto).element).expect("the brain can be filled")
+    });
     let (unit_us, mut observed) = (unit_us(), Observed::default());
     for _ in 0..SCENES {
         let (situation, stretch) = super::stretch(&case, &mut random);

@@ -1,12 +1,12 @@
 //! Scenes on trial: every choice run, the plan asked, both noted.
 
 use super::case::{Case, Source};
-use super::scene::{MACHINE, Situation};
+use super::scene::Situation;
 use crate::engine::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{
-    Bone, Choice, FEATURES, Kind, Quality, Row as Laws, Rows, Setup, TissueForce, bone_cores, bone_error_n,
-    holds_walls, picture_cores, plan_with, tissue_cores, tissue_over,
+    Bone, Choice, FEATURES, Kind, Machine, Picture, Plan, Quality, Row as Laws, Rows, Scene, Setup, Tissue,
+    TissueForce, bone_error_n, holds_walls, plan_with, tissue_over,
 };
 use trepan_simulator::measure::CaseErrors;
 use trepan_simulator::measure::bone::Stretch;
@@ -83,31 +83,66 @@ fn note(name: &str, situation: &Situation, rows: &Rows, own: &CaseErrors, found:
     let (holding, on_bone): (Vec<_>, Vec<_>) = rows.bone.iter().copied().zip(on_bone).filter(holds_walls).unzip();
     let rows = &Rows { bone: holding, ..rows.clone() };
     let looked_at = own.instead(rows.clone());
-    let plan = plan_with(&MACHINE, scene, &looked_at).expect("the scene is sound");
+    let machine = &situation.machine;
+    let plan = plan_with(machine, scene, &looked_at).expect("the scene is sound");
     let (bone, tissue, picture) =
         (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"), plan.picture);
+    let chosen = Alone {
+        bone: of_choice(&rows.bone, bone.what),
+        tissue: of_choice(&rows.tissue, tissue.what),
+        picture: of_choice(&rows.picture, picture.what),
+    };
+    let planned = |alone: Alone| alone.plan(machine, scene);
     let of = |kind, tolerance, features| Of { scene: format!("{name}, {kind}"), kind, tolerance, features };
     let all = rows.bone.iter().zip(on_bone).map(|(row, error)| {
-        judged(row.what, error, None, error / scene.force_error_n, bone_cores(&MACHINE, scene, row))
+        let priced = planned(Alone { bone: *row, ..chosen }).bone.expect("there is bone");
+        let over = error / scene.force_error_n;
+        Judged { what: row.what, error, force: None, over, cost: priced.cost, in_time: priced.in_time }
     });
     let said =
         Said::of(&bone, bone.error / scene.force_error_n, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
     of("bone", scene.force_error_n, scene.bone_features()).note(all.collect(), said, |setup| setup.bone, findings);
     let all = rows.tissue.iter().zip(in_tissue).map(|(row, found)| {
-        let over = tissue_over(scene, found.error_mm, Some(found.force));
-        judged(row.what, found.error_mm, Some(found.force), over, tissue_cores(&MACHINE, scene, row))
+        let priced = planned(Alone { tissue: *row, ..chosen }).tissue.expect("there is tissue");
+        let (error, force) = (found.error_mm, Some(found.force));
+        let over = tissue_over(scene, error, force);
+        Judged { what: row.what, error, force, over, cost: priced.cost, in_time: priced.in_time }
     });
     let features = scene.tissue_features();
     let over = tissue_over(scene, tissue.error, tissue.force);
     let said = Said::of(&tissue, over, &rows.tissue, &looked_at.tissue, |row| row.error.at_most(&features));
     of("tissue", scene.displacement_mm, features).note(all.collect(), said, |setup| setup.tissue, findings);
     let all = rows.picture.iter().zip(seen).map(|(row, error)| {
-        judged(row.what, error, None, error / scene.picture_error_percent, picture_cores(&MACHINE, scene, row))
+        let priced = planned(Alone { picture: *row, ..chosen }).picture;
+        let over = error / scene.picture_error_percent;
+        Judged { what: row.what, error, force: None, over, cost: priced.cost, in_time: priced.in_time }
     });
     let features = scene.picture_features();
     let over = picture.error / scene.picture_error_percent;
     let said = Said::of(&picture, over, &rows.picture, &looked_at.picture, |row| row.error.at_most(&features));
     of("picture", scene.picture_error_percent, features).note(all.collect(), said, |setup| setup.picture, findings);
+}
+
+/// One row of each kind.
+#[derive(Clone, Copy)]
+struct Alone {
+    bone: Laws<Bone>,
+    tissue: Laws<Tissue>,
+    picture: Laws<Picture>,
+}
+
+impl Alone {
+    /// The plan without another choice: what it costs, and whether it runs in time.
+    fn plan(self, machine: &Machine, scene: &Scene) -> Plan {
+        let Self { bone, tissue, picture } = self;
+        let rows = Rows { bone: vec![bone], tissue: vec![tissue], picture: vec![picture] };
+        plan_with(machine, scene, &rows).expect("the scene is sound")
+    }
+}
+
+/// The row of a choice.
+fn of_choice<T: Kind + PartialEq>(rows: &[Laws<T>], what: T) -> Laws<T> {
+    *rows.iter().find(|row| row.what == what).expect("a choice comes from a row")
 }
 
 /// A choice as it was found to be.
@@ -119,10 +154,7 @@ struct Judged<T> {
     /// The worst of its errors over their tolerances.
     over: f64,
     cost: f64,
-}
-
-fn judged<T>(what: T, error: f64, force: Option<TissueForce>, over: f64, cost: f64) -> Judged<T> {
-    Judged { what, error, force, over, cost }
+    in_time: bool,
 }
 
 /// A kind of choice in a scene.
@@ -140,6 +172,8 @@ struct Said<T> {
     over: f64,
     meets: bool,
     believed: Vec<Option<f64>>,
+    /// The same of the force on tissue, N.
+    believed_force: Vec<Option<f64>>,
 }
 
 impl<T: Kind + PartialEq> Said<T> {
@@ -150,8 +184,14 @@ impl<T: Kind + PartialEq> Said<T> {
         looked_at: &[Laws<T>],
         error: impl Fn(&Laws<T>) -> f64,
     ) -> Self {
-        let believed = |row: &Laws<T>| looked_at.iter().find(|seen| seen.what == row.what).map(&error);
-        Self { what: choice.what, over, meets: choice.meets_tolerance, believed: rows.iter().map(believed).collect() }
+        let of = |row: &Laws<T>| looked_at.iter().find(|seen| seen.what == row.what);
+        Self {
+            what: choice.what,
+            over,
+            meets: choice.meets_tolerance && choice.in_time,
+            believed: rows.iter().map(|row| of(row).map(&error)).collect(),
+            believed_force: rows.iter().map(|row| Some(of(row)?.force?.error_n)).collect(),
+        }
     }
 }
 
@@ -164,7 +204,7 @@ impl Of {
         findings: &mut Findings,
     ) {
         let of = |what: T| all.iter().find(|n| n.what == what);
-        let meeting = all.iter().filter(|n| n.over <= 1.0);
+        let meeting = all.iter().filter(|n| n.over <= 1.0 && n.in_time);
         let cheapest = meeting.min_by(|a, b| a.cost.total_cmp(&b.cost));
         let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(said.what, &of_setup))));
         for (name, taken) in chosen.chain([("cheapest", cheapest)]) {
@@ -175,7 +215,13 @@ impl Of {
             let four = |x: f64| (x * 1e4).round() / 1e4;
             auto.config.insert("errors".into(), all.iter().map(|n| four(n.error)).collect::<Vec<_>>().into());
             auto.config.insert("features".into(), self.features.map(four).to_vec().into());
-            auto.config.insert("believed".into(), said.believed.iter().map(|e| e.map(four)).collect::<Vec<_>>().into());
+            let believed = |of: &[Option<f64>]| of.iter().map(|e| e.map(four)).collect::<Vec<_>>();
+            auto.config.insert("believed".into(), believed(&said.believed).into());
+            let forces: Vec<f64> = all.iter().filter_map(|n| Some(four(n.force?.error_n))).collect();
+            if !forces.is_empty() {
+                auto.config.insert("force_errors".into(), forces.into());
+                auto.config.insert("believed_forces".into(), believed(&said.believed_force).into());
+            }
             auto.metrics.insert("bound_over_tolerance".into(), said.over);
             auto.metrics.insert("says_met_count".into(), f64::from(u8::from(said.meets)));
         }
@@ -188,6 +234,7 @@ impl Of {
             .with("tolerance", self.tolerance)
             .metric("error_over_tolerance", taken.over)
             .metric("own_error_over_tolerance", taken.error / self.tolerance)
+            .metric("in_time_count", f64::from(u8::from(taken.in_time)))
             .metric("cost_cores", taken.cost);
         match taken.force {
             Some(TissueForce { error_n, force_n }) => row.metric("force_error_n", error_n).metric("force_n", force_n),
