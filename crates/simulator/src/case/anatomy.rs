@@ -200,8 +200,7 @@ pub(super) fn make_classes(
     Ok(classes)
 }
 
-/// Builds the brain: the MRI on the grid of the classes, and tetrahedra, refined around the opening's
-/// place on it.
+/// Builds the brain: the MRI on the grid of the classes, and tetrahedra, refined at the opening.
 pub(super) fn make_brain(
     mri: &VoxelVolume<f32>,
     classes: VoxelVolume<u8>,

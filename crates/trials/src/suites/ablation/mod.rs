@@ -53,8 +53,8 @@ const SIZES: &str = "--quality usual";
 const AGAIN: &str = "default, again";
 /// Name of the run with every value that physical realism asks for.
 const TOGETHER: &str = "all that realism asks for";
-/// Settings of a row: what it may change, whether it leaves out what the default has, and why it did
-/// not run.
+/// Settings of a row: what it may change, whether it leaves out what the default has, and why it
+/// did not run.
 const EFFECT: &str = "effect";
 const LEFT_OUT: &str = "left out";
 const NOT_RUN: &str = "not run";

@@ -3,9 +3,9 @@
 //!
 //! # Theory
 //! A scene asks for three tolerances. One that no choice meets in time on the scene's machine is
-//! left out of its scene and counted: there the plan must say so. Apart from scenes, what the plan says is held against what
-//! its choices do: a tolerance that it doubts, and misses though some other choice meets it, is a
-//! miss but no broken word.
+//! left out of its scene and counted: there the plan must say so. Apart from scenes, what the plan
+//! says is held against what its choices do: a tolerance that it doubts, and misses though some
+//! other choice meets it, is a miss but no broken word.
 
 use super::super::Scope;
 use crate::engine::picture::{Chart, Mark};
