@@ -1,14 +1,11 @@
 //! Builds a skull on cubic voxels, a brain mask and tetrahedra from a patient's images.
 
-use crate::case::opening::Opening;
 use crate::case::{Brain, Inputs};
 use crate::error::SessionError;
-use crate::measure::tissue::Fineness;
 use crate::recipe::Recipe;
 use glam::DAffine3;
 use std::path::Path;
-use trepan_geometry::Vec3;
-use trepan_mesh::lattice::{self, LabelledMesh};
+use trepan_mesh::lattice::{self, Fine, LabelledMesh};
 use trepan_volume::{
     AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig,
     VoxelVolume, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register, resample, room_for,
@@ -204,14 +201,12 @@ pub(super) fn make_classes(
 pub(super) fn make_brain(
     mri: &VoxelVolume<f32>,
     classes: VoxelVolume<u8>,
-    opening: Option<Opening>,
+    fine: Option<Fine>,
     recipe: &Recipe,
 ) -> Result<Brain, SessionError> {
     room_for("tetrahedra", recipe.tets as u64, TET_BYTES)
         .map_err(|fault| SessionError::Usage(format!("--tets {}: {fault}; give fewer", recipe.tets)))?;
     let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
-    let fineness = Fineness::stepped(recipe.tets, recipe.halvings);
-    let fine = opening.and_then(|opening| fineness.fine(opening.brain(), -Vec3::from(opening.inward)));
     let config = lattice::Config { target_tets: recipe.tets, fine, ..lattice::Config::default() };
     let LabelledMesh { mesh, label_of_tet } = lattice::labelled(&classes.map(u16::from), &config)
         .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;

@@ -20,7 +20,7 @@ use crate::case::{Case, Inputs};
 use crate::error::SessionError;
 use crate::ingredients::Element;
 use crate::measure::bone::Skull;
-use crate::measure::tissue::Shape;
+use crate::measure::tissue::{Fineness, Shape};
 use crate::measure::{CaseErrors, Sight};
 use crate::models::Facts;
 use crate::program::Program;
@@ -31,6 +31,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
+use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_volume::{VoxelVolume, bone_isovalue, overlap, skull_only};
 
@@ -320,8 +321,10 @@ fn build(
     };
     stages.next("meshing the brain");
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
-    let place = opening.or_else(bare);
-    let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, place, recipe)).transpose()?;
+    let fineness = Fineness::stepped(recipe.tets, recipe.halvings);
+    let at = |opening: Opening| fineness.fine(opening.brain(), -Vec3::from(opening.inward));
+    let fine = opening.or_else(bare).and_then(at);
+    let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, fine, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }
 
