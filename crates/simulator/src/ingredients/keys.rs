@@ -557,6 +557,7 @@ mod tests {
             element: Element::LockingFree,
             relaxation: Relaxation::Prony,
             friction: 0.1,
+            bone_friction: 0.3,
             ..Ingredients::default()
         };
         let all = Quality::ALL.map(Ingredients::of);
