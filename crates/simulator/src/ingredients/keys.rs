@@ -16,7 +16,7 @@ pub struct Key {
     pub about: &'static str,
     /// Value of a session without `--set`; `None` where `--quality` chooses.
     pub usual: Option<&'static str>,
-    /// Values of qualities that differ from it: those that change more than the tolerance in the
+    /// Values of qualities that differ from it: most change about the tolerance or more in the
     /// built-in operation, and run in time (`validate ablation`).
     pub presets: &'static [(Quality, &'static str)],
     /// Why no quality takes another value than the default, though one changes more or realism asks

@@ -13,7 +13,7 @@
 //!
 //! # Practice
 //! The choice is made once, at start. The machine is measured only for parts that a plan chooses,
-//! in under two seconds. The case is measured once, in about 30 s. A replay, a preset or a session
+//! in under two seconds. The case is measured once, in about 20 s. A replay, a preset or a session
 //! with all values given measures nothing, so it is the same on every machine.
 
 mod describe;
