@@ -32,6 +32,12 @@ pub trait SoftSolver: Send {
 
     /// Longest step that is stable with margin, ms; infinite for implicit and static solvers.
     fn stable_dt_ms(&self) -> f32;
+
+    /// Longest step that is stable as the body is deformed now, ms; at most
+    /// [`stable_dt_ms`](Self::stable_dt_ms). A longer one may be cut into substeps.
+    fn next_dt_ms(&self) -> f32 {
+        self.stable_dt_ms()
+    }
 }
 
 /// What a solver publishes of its nodes.

@@ -9,6 +9,11 @@ use trepan_soft::{Body, BodyError, NodeState, Stiffness, lowest_frequency_of};
 
 /// Share of the present stable step that a substep may use.
 const SUBSTEP_SAFETY: f32 = 0.95;
+/// Growth that the next step is to bear, as a multiple of the present one.
+const GROWTH_AHEAD: f32 = 1.1;
+/// Shortest recommended step, as a share of the stable one at rest. What needs a shorter one is
+/// recovering from inversion, and takes substeps.
+const SHORTEST: f32 = 0.5;
 /// Tolerance that keeps rounding from adding a substep.
 const NEARLY: f32 = 1.0 - 1e-5;
 
@@ -62,6 +67,12 @@ impl Base {
     /// Longest step that is stable with margin at rest, ms.
     pub fn stable_dt_ms(&self) -> f32 {
         self.config.safety * self.bound.elements_ms()
+    }
+
+    /// Recommended length of the next step, ms, where an element's ω² grew by `growth` in the last
+    /// one, 1/ms². A call of this length is mostly a single substep.
+    pub fn next_dt_ms(&self, growth: f32) -> f32 {
+        self.longest_ms(GROWTH_AHEAD * growth).max(SHORTEST * self.stable_dt_ms())
     }
 
     /// Number of equal substeps that `ms` takes where an element's ω² grew by `growth`, 1/ms².

@@ -85,14 +85,18 @@ pub fn fastest(
 
 fn cost_per_ms(solver: &mut dyn SoftSolver, loads: &Loads, each_ms: f64, now_ms: &dyn Fn() -> f64) -> f64 {
     // A solver without a stability limit takes the simulators' step.
-    let dt_ms = solver.stable_dt_ms().min(1.0);
-    solver.step(loads, dt_ms);
-    let (start, mut steps) = (now_ms(), 0u32);
-    while now_ms() - start < each_ms && steps < 1_000_000 {
+    let mut step = || {
+        let dt_ms = solver.next_dt_ms().min(1.0);
         solver.step(loads, dt_ms);
+        f64::from(dt_ms)
+    };
+    step();
+    let (start, mut steps, mut tissue_ms) = (now_ms(), 0u32, 0.0);
+    while steps == 0 || (now_ms() - start < each_ms && steps < 1_000_000) {
+        tissue_ms += step();
         steps += 1;
     }
-    (now_ms() - start) / (f64::from(steps.max(1)) * f64::from(dt_ms))
+    (now_ms() - start) / tissue_ms
 }
 
 #[cfg(test)]

@@ -11,7 +11,8 @@
 //!
 //! # Practice
 //! A step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms). A longer one is
-//! cut into substeps, and so is one over the stable step of the elements as deformed now. Elements
+//! cut into substeps, and so is one over the stable step of the elements as deformed now, which
+//! [`next_dt_ms`](trepan_soft::SoftSolver::next_dt_ms) tells. Elements
 //! are stored in blocks of sixteen, one lane each. Their forces are stored and gathered per node in
 //! a fixed order, so the same input gives the same bytes on every machine and with every kernel. A
 //! step neither allocates nor panics. With several threads it takes locks that nobody else holds,

@@ -19,6 +19,8 @@ pub struct Tled {
     pressure: SurfacePressure,
     mass_added: f32,
     gravity: Vec3,
+    /// Largest growth of an element's ω² in the last pass, 1/ms².
+    growth: f32,
 }
 
 impl SoftSolver for Tled {
@@ -40,6 +42,10 @@ impl SoftSolver for Tled {
     fn stable_dt_ms(&self) -> f32 {
         self.base.stable_dt_ms()
     }
+
+    fn next_dt_ms(&self) -> f32 {
+        self.base.next_dt_ms(self.growth)
+    }
 }
 
 impl Tled {
@@ -52,6 +58,7 @@ impl Tled {
         self.elements.volumes(self.base.elapsed_ms);
         let pass = self.elements.forces(self.base.elapsed_ms);
         report.inverted = report.inverted.max(pass.inverted);
+        self.growth = pass.growth;
         let substeps = if self.base.config.substeps == 0 { 1.0 } else { self.base.substeps(left_ms, pass.growth) };
         let dt_ms = left_ms / substeps;
         let update = self.update_of(loads, dt_ms);
@@ -107,6 +114,7 @@ impl Tled {
         let nodes = Nodes::of(body, &base.layout, &masses);
         Ok(Self {
             gravity: Vec3::ZERO,
+            growth: 0.0,
             elements: Elements::of(body, &base.layout, &scaling, nodes, config),
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),

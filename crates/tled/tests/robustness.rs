@@ -45,6 +45,13 @@ fn press(stiffness: f32, damping: f32) -> Loads {
     Loads { contacts: contact.into(), ..Loads::default() }
 }
 
+/// A stiff spring that presses the corner down by about so much.
+fn press_by(depth_mm: f32) -> Loads {
+    let mut loads = press(0.3, 0.1);
+    loads.contacts[0].offset_mm = depth_mm - 40.0;
+    loads
+}
+
 #[test]
 fn runs_repeat_bit_for_bit_whatever_the_kernel_and_the_number_of_threads() {
     let end = |kernel, threads| {
@@ -152,6 +159,29 @@ fn a_hard_hit_at_the_full_step_is_survived_by_substeps() {
     }
     assert!((2..=4).contains(&most), "{most}");
     assert!(tled.velocities().iter().all(|v| v.length() < 1e-4));
+}
+
+/// Under a probe, steps of [`SoftSolver::next_dt_ms`] do the same in fewer substeps than those of
+/// the step at rest, which are cut in two there.
+#[test]
+fn the_step_of_the_deformed_body_saves_substeps() {
+    let pressed = |next: bool| {
+        let mut tled = shaken(&Config::default(), 0.0);
+        let (rest_ms, mut now_ms, mut substeps, mut force) = (tled.stable_dt_ms(), 0.0, 0, 0.0);
+        assert_eq!(tled.next_dt_ms(), rest_ms);
+        while now_ms < 600.0 {
+            let dt_ms = if next { tled.next_dt_ms() } else { rest_ms };
+            assert!(dt_ms <= rest_ms && dt_ms >= 0.5 * rest_ms);
+            let report = tled.step(&press_by(8.0), dt_ms);
+            (now_ms, substeps, force) = (now_ms + dt_ms, substeps + report.substeps, report.contact_n);
+        }
+        (f64::from(substeps) * f64::from(rest_ms) / 600.0, force, tled.positions().to_vec())
+    };
+    let [(cut, cut_n, cut_at), (next, next_n, next_at)] = [false, true].map(pressed);
+    assert!(cut > 1.9 && next < 0.85 * cut, "{cut} and {next} substeps for each at rest");
+    assert!((next_n / cut_n - 1.0).abs() < 1e-3, "{next_n} and {cut_n} N");
+    let apart = cut_at.iter().zip(&next_at).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+    assert!(apart < 5e-3, "{apart} mm apart");
 }
 
 #[test]

@@ -36,7 +36,7 @@ use trepan_volume::{DistanceField, VoxelVolume};
 const TETS: [usize; 3] = [3_000, 8_000, 20_000];
 /// Meshes refined at the opening: tetrahedra of the whole brain, and halvings of the edge length
 /// there.
-const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [2, 3]);
+const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [3, 4]);
 /// A mesh that the other solvers can step in real time.
 const RIVALS_TETS: usize = 3_000;
 
@@ -55,13 +55,17 @@ pub struct Fineness {
 
 impl Fineness {
     /// Ground truth for validation.
-    pub const JUDGE: Self = Self { tets: 50_000, halvings: 4, radius_mm: 8.0, above_mm: 0.0 };
+    pub const JUDGE: Self = Self::at_opening(100_000, 4, TRUTH_MM);
     /// Ground truth that a session computes at its start.
-    pub const QUICK: Self = Self { tets: 25_000, halvings: 4, radius_mm: 8.0, above_mm: 0.0 };
+    pub const QUICK: Self = Self::at_opening(40_000, 4, TRUTH_MM);
 
     /// Resolution of a mesh that a session can step.
     pub const fn stepped(tets: usize, halvings: u32) -> Self {
-        let [wide, deep] = OPENING_MM;
+        Self::at_opening(tets, halvings, OPENING_MM)
+    }
+
+    /// Small elements around an opening, to a radius on the surface and a depth, mm.
+    const fn at_opening(tets: usize, halvings: u32, [wide, deep]: [f32; 2]) -> Self {
         let radius_mm = (wide * wide + deep * deep) / (2.0 * deep);
         Self { tets, halvings, radius_mm, above_mm: radius_mm - deep }
     }
@@ -74,9 +78,11 @@ impl Fineness {
     }
 }
 
-/// Radius on the surface and depth of the refined region in a session's mesh, mm. Deeper down a
-/// probe of 2 mm strains too little to need small elements.
-const OPENING_MM: [f32; 2] = [10.0, 6.0];
+/// Radius on the surface and depth of the refined region in a session's mesh, mm: a burr hole of
+/// 5 mm and a probe of 2 mm. Further away a probe strains too little to need small elements.
+const OPENING_MM: [f32; 2] = [7.0, 4.0];
+/// The same in a ground truth.
+const TRUTH_MM: [f32; 2] = [8.0, 5.0];
 /// Largest mass that mass scaling adds, as a share of the brain's mass; the weight is unchanged. It
 /// is added to the elements with the shortest stable time steps: slivers and refined ones.
 pub const MASS_ADDED: f32 = 0.01;
@@ -120,9 +126,10 @@ pub struct Measurement {
     pub error_mm: f64,
     /// Force of the tool and its error, the worse of push and slide.
     pub force: TissueForce,
-    /// Work of a TLED step, as a share of one with all tetrahedra awake; 1 for other solvers.
-    pub awake: f64,
-    /// Time step, ms.
+    /// Work of a TLED step, as a share of one substep with all tetrahedra awake; for other solvers
+    /// the number of substeps.
+    pub work: f64,
+    /// Mean time step, ms.
     pub dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
     pub ns: f64,
@@ -133,7 +140,7 @@ pub struct Measurement {
 pub fn cost(at: usize, choices: &[Tissue], found: &[Measurement], scene: &Scene) -> f64 {
     let (choice, of) = (&choices[at], &found[at]);
     let of_step = match choice.solver {
-        "tled" => of.awake,
+        "tled" => of.work,
         _ => of.ns / found[unit(choices)].ns,
     };
     of_step * dt_ms(scene, choice) / of.dt_ms
@@ -263,9 +270,9 @@ struct Pushed {
     surfaces: [Surroundings; 3],
     /// Force of the tool at the end of each, N.
     forces_n: [f64; 2],
-    /// Mean work of a step, as a share of one with all tetrahedra awake.
-    awake: f64,
-    /// Time step, ms.
+    /// Mean work of a step, as a share of one substep with all tetrahedra awake.
+    work: f64,
+    /// Mean time step, ms.
     dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
     ns: f64,
@@ -327,8 +334,8 @@ impl Push {
 
     fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Result<Measurement, SessionError> {
         let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
-        let Pushed { awake, dt_ms, ns, .. } = found;
-        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), awake, dt_ms, ns })
+        let Pushed { work, dt_ms, ns, .. } = found;
+        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), work, dt_ms, ns })
     }
 
     /// Distance of this ground truth from a finer one, 95th percentile over the places, mm.
@@ -385,7 +392,6 @@ fn run(
 ) -> Result<Pushed, SessionError> {
     let rest = Surroundings::of(mesh, ends[0])?;
     let ball = Ball { slide, normal, ends };
-    let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
     let (mut surfaces, mut forces_n) = (vec![rest], [0.0; 2]);
     let (mut work, mut steps, mut step_ms) = (0.0, 0u32, 0.0);
@@ -398,9 +404,10 @@ fn run(
                 next += TURN_MS;
             }
             let clock = Clock::start();
-            solver.seam().step(&loads, dt_ms);
+            let dt_ms = solver.seam().next_dt_ms().min(longest_ms);
+            let substeps = solver.seam().step(&loads, dt_ms).substeps;
             step_ms += clock.now_ms();
-            work += solver.work();
+            work += f64::from(substeps.max(1)) * solver.work();
             (steps, now) = (steps + 1, now + dt_ms);
         }
         let positions = solver.seam().positions();
@@ -410,7 +417,7 @@ fn run(
     }
     let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
     let surfaces = surfaces.try_into().unwrap_or_else(|_| unreachable!("at rest and at two ends"));
-    Ok(Pushed { surfaces, forces_n, awake: work / f64::from(steps), dt_ms: dt_ms.into(), ns })
+    Ok(Pushed { surfaces, forces_n, work: work / f64::from(steps), dt_ms: f64::from(now) / f64::from(steps), ns })
 }
 
 /// The tip of the tool on its way: down at one end of the slide, then straight to the other.

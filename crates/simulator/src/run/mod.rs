@@ -304,7 +304,7 @@ impl SolverOutcome {
     /// Returns the part of the outcome that a solver stage knows itself.
     pub(crate) fn of(stage: &SolverStage) -> Self {
         Self {
-            dt_ms: stage.dt_ms(),
+            dt_ms: stage.mean_dt_ms(),
             max_displacement_mm: stage.max_displacement_mm(),
             end_displacement_mm: stage.displacement_mm(),
             solver_faults: *stage.solver_faults(),

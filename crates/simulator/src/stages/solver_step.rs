@@ -29,13 +29,15 @@ impl SolverStage {
             self.contact_seq = contact_seq;
             self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
         }
-        let report = self.solver.step(&self.loads, self.dt_ms);
+        let dt_ms = self.dt_ms();
+        let report = self.solver.step(&self.loads, dt_ms);
         self.steps += 1;
+        self.time_ms += f64::from(dt_ms);
         self.solver_faults.add(&report);
         if !self.loads.contacts.is_empty() {
             self.touched_ms = self.time_ms();
         } else if self.time_ms() - self.touched_ms > MOVES_BACK_MS {
-            self.solver_faults.rest(self.fastest() * self.dt_ms);
+            self.solver_faults.rest(self.fastest() * dt_ms);
         }
         (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
     }
@@ -64,7 +66,8 @@ pub struct SolverStage {
     solver: Box<dyn SoftSolver>,
     rest: Vec<Vec3>,
     loads: Loads,
-    dt_ms: f32,
+    /// Simulated time, ms.
+    time_ms: f64,
     steps: u64,
     contact_seq: u64,
     solver_faults: SolverFaults,
@@ -135,8 +138,8 @@ impl SolverStage {
     pub fn new(solver: Box<dyn SoftSolver>) -> Self {
         Self {
             rest: solver.positions().to_vec(),
-            dt_ms: solver.stable_dt_ms(),
             solver,
+            time_ms: 0.0,
             loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
             steps: 0,
             contact_seq: 0,
@@ -172,9 +175,14 @@ impl SolverStage {
         self.max_displacement_mm
     }
 
-    /// Length of a step, ms.
+    /// Length of the next step, ms: shorter than at rest while the brain is deformed much.
     pub fn dt_ms(&self) -> f32 {
-        self.dt_ms
+        self.solver.next_dt_ms()
+    }
+
+    /// Mean length of the steps done, ms; that of the next one before the first.
+    pub fn mean_dt_ms(&self) -> f32 {
+        if self.steps > 0 { (self.time_ms / self.steps as f64) as f32 } else { self.dt_ms() }
     }
 
     /// Steps done.
@@ -184,7 +192,7 @@ impl SolverStage {
 
     /// Simulated time, ms.
     pub fn time_ms(&self) -> f64 {
-        self.steps as f64 * f64::from(self.dt_ms)
+        self.time_ms
     }
 
     /// Returns the faults so far.

@@ -290,6 +290,10 @@ impl SoftSolver for GpuTled {
     fn stable_dt_ms(&self) -> f32 {
         self.base.stable_dt_ms()
     }
+
+    fn next_dt_ms(&self) -> f32 {
+        self.base.next_dt_ms(self.growth)
+    }
 }
 
 /// Refuses what the kernels lack.

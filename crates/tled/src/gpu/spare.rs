@@ -70,4 +70,8 @@ impl SoftSolver for WithSpare {
     fn stable_dt_ms(&self) -> f32 {
         self.card.stable_dt_ms()
     }
+
+    fn next_dt_ms(&self) -> f32 {
+        if self.is_lost() { self.spare.next_dt_ms() } else { self.card.next_dt_ms() }
+    }
 }

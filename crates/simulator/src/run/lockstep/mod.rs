@@ -113,15 +113,17 @@ struct Replay<'a> {
     collision_times: Times,
     replayed: Replayed,
     last: Option<TickRecord>,
-    /// Solver steps of this replay per recorded step; `None` where both have the same length.
-    pace: Option<f64>,
+    /// Solver records of the recording, by step.
+    recorded: &'a [SolverRecord],
+    /// Whether steps are matched by time, because this solver's differ from the recorded ones.
+    by_time: bool,
 }
 
 impl<'a> Replay<'a> {
     fn new(stages: Stages, recording: &'a Recording, senders: JournalSenders, start: ToolSample) -> Self {
-        let dt_ms = stages.tissue.as_ref().map(|tissue| tissue.solver.dt_ms());
         Self {
-            pace: dt_ms.and_then(|dt_ms| pace(recording, dt_ms)),
+            recorded: &recording.solver,
+            by_time: false,
             haptic: stages.haptic,
             second: stages.second,
             seconds: recording.second.iter(),
@@ -221,23 +223,31 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Returns the number of the step in this replay at the time of a recorded step.
-    fn step_here(&self, step: u64) -> u64 {
-        self.pace.map_or(step, |pace| (step as f64 * pace).round() as u64)
+    /// Whether the solver is at a recorded step after `more` further steps, or past it.
+    fn reaches(&self, step: u64, more: u64) -> bool {
+        let Some(solver) = self.tissue.as_ref().map(|tissue| &tissue.solver) else { return true };
+        if self.by_time {
+            let further = (more as f64 + 0.5) * f64::from(solver.dt_ms());
+            solver.time_ms() + further > time_of(self.recorded, step)
+        } else {
+            solver.steps() + more >= step
+        }
     }
 
     /// Runs every solver step up to a recorded number, each with its recorded contact.
     fn solve_up_to(&mut self, step: u64, clock: &Clock) {
-        let step = self.step_here(step);
-        while self.tissue.as_ref().is_some_and(|tissue| tissue.solver.steps() < step) {
+        while !self.reaches(step, 0) {
             self.solve(clock);
         }
     }
 
+    /// Runs a solver step. A step that ends at another time than the recorded one of this number
+    /// shows that the solver is another, by its mesh or its element.
     fn solve(&mut self, clock: &Clock) {
-        let Some(next) = self.tissue.as_ref().map(|tissue| tissue.solver.steps() + 1) else { return };
-        while let Some(switch) = self.switches.front().copied().filter(|s| self.step_here(s.step) <= next) {
+        let mut last = None;
+        while let Some(switch) = self.switches.front().copied().filter(|s| self.reaches(s.step, 1)) {
             self.switches.pop_front();
+            last = Some(switch);
             while self.loads.front().is_some_and(|(seq, _)| *seq < switch.contact_seq) {
                 self.loads.pop_front();
             }
@@ -250,6 +260,8 @@ impl<'a> Replay<'a> {
         let record = tissue.solver.step(&self.load.1, self.load.0);
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.step_times.add_us(us);
+        let (steps, time_ms) = (tissue.solver.steps(), tissue.solver.time_ms());
+        self.by_time |= last.is_some_and(|last: SolverRecord| last.step == steps && last.time_ms != time_ms);
         if let Some(mut record) = record {
             record.compute_us = us;
             self.senders.solver.send(record);
@@ -282,12 +294,14 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Returns the number of steps of `dt_ms` per recorded step; `None` where both have the same
-/// length.
-fn pace(recording: &Recording, dt_ms: f32) -> Option<f64> {
-    let last = recording.solver.last().filter(|last| last.step > 0)?;
-    let recorded_ms = last.time_ms / last.step as f64;
-    (recorded_ms as f32 != dt_ms).then(|| recorded_ms / f64::from(dt_ms))
+/// Returns the end of a recorded step, ms; between two records and after the last one from steps
+/// of one length.
+fn time_of(records: &[SolverRecord], step: u64) -> f64 {
+    let after = records.partition_point(|record| record.step < step).min(records.len().saturating_sub(1));
+    let at = |record: &SolverRecord| (record.step as f64, record.time_ms);
+    let Some((last, last_ms)) = records.get(after).map(at) else { return 0.0 };
+    let (first, first_ms) = after.checked_sub(1).map_or((0.0, 0.0), |before| at(&records[before]));
+    first_ms + (last_ms - first_ms) * (step as f64 - first) / (last - first).max(1.0)
 }
 
 /// Restores the device's reading at a recorded tick.
@@ -321,13 +335,12 @@ mod tests {
     use trepan_volume::{BoneVolume, VoxelVolume};
 
     #[test]
-    fn steps_of_another_length_are_matched_by_time() {
-        let dt_ms = 0.837_21f32;
-        let last = SolverRecord { step: 7168, time_ms: 7168.0 * f64::from(dt_ms), ..SolverRecord::default() };
-        let recording = Recording { solver: vec![last], ..Recording::default() };
-        assert_eq!(pace(&recording, dt_ms), None, "the same steps");
-        assert!((pace(&recording, 0.5 * dt_ms).expect("another length") - 2.0).abs() < 1e-9);
-        assert_eq!(pace(&Recording::default(), dt_ms), None);
+    fn the_time_of_a_recorded_step_lies_between_its_records() {
+        let record = |step, time_ms| SolverRecord { step, time_ms, ..SolverRecord::default() };
+        let records = [record(2, 1.0), record(4, 2.0), record(8, 3.0)];
+        let times = [0, 1, 2, 3, 4, 6, 8, 12].map(|step| time_of(&records, step));
+        assert_eq!(times, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0]);
+        assert_eq!(time_of(&[], 5), 0.0);
     }
 
     fn at(z: f32, buttons: Buttons) -> ToolState {
