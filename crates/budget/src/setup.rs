@@ -70,14 +70,14 @@ impl Quality {
     pub fn preset(self) -> Option<Setup> {
         let setup = |spacing_mm, tets, sparse, detail| Setup {
             bone: Bone { method: "god-object-sphere", spacing_mm, points: 0 },
-            tissue: Tissue { solver: "tled", tets, halvings: 2, still_mm: 0.0 },
+            tissue: Tissue { solver: "tled", tets, halvings: 4, still_mm: 0.0 },
             picture: Picture { sparse, detail },
         };
         Some(match self {
             Self::Auto => return None,
             Self::Draft => setup(1.5, 3_000, true, 0.5),
             Self::Usual => setup(1.0, 8_000, false, 1.0),
-            Self::Fine => setup(0.5, 20_000, false, 1.0),
+            Self::Fine => setup(0.5, 12_000, false, 1.0),
         })
     }
 
@@ -139,7 +139,7 @@ mod tests {
         assert!(draft.tissue.tets < usual.tissue.tets && usual.tissue.tets < fine.tissue.tets);
         assert_eq!(
             usual.to_string(),
-            "god-object-sphere on 1 mm voxels; tled with 8000 tetrahedra, edges 1/4 at the opening; every ray"
+            "god-object-sphere on 1 mm voxels; tled with 8000 tetrahedra, edges 1/16 at the opening; every ray"
         );
         let alike = Tissue { halvings: 0, still_mm: 0.01, ..draft.tissue };
         assert_eq!(alike.to_string(), "tled with 3000 tetrahedra, what moves over 0.01 mm");

@@ -153,9 +153,9 @@ pub struct Patient {
     /// `case build`]
     #[arg(long, value_name = "N")]
     pub tets: Option<usize>,
-    /// Halvings of the edge length within 10 mm of the opening, 6 mm deep, at the same count
-    /// [default: by --quality; 2 for `case build`]
-    #[arg(long, alias = "finer", value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=3))]
+    /// Halvings of the edge length within 7 mm of the opening, 4 mm deep, at the same count
+    /// [default: by --quality; 4 for `case build`]
+    #[arg(long, alias = "finer", value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=4))]
     pub opening_refinement: Option<u32>,
     /// Register the MRI (and labels) to the CT by mutual information
     #[arg(long)]

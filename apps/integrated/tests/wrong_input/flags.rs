@@ -14,7 +14,7 @@ pub const TABLE: &[Wrong] = &[
     ("a dozen tetrahedra", "--tets 12", &["--tets 12", "500 to 1000000"]),
     ("a billion tetrahedra", "--tets 1000000000", &["--tets", "500 to 1000000"]),
     ("negative tetrahedra", "--tets -5", &["-5"]),
-    ("too fine an opening", "--opening-refinement 9", &["--opening-refinement", "0..=3"]),
+    ("too fine an opening", "--opening-refinement 9", &["--opening-refinement", "0..=4"]),
     ("a threshold of air", "--isovalue-hu -1000", &["--isovalue-hu", "-900 to 3000"]),
     ("a threshold over all bone", "--isovalue-hu 3001", &["--isovalue-hu", "-900 to 3000"]),
     ("a threshold that is no number", "--isovalue-hu bone", &["--isovalue-hu", "bone"]),

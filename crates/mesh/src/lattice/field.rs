@@ -61,6 +61,7 @@ impl Block {
 }
 
 /// Approximate distance to a boundary, mm, positive inside.
+#[derive(Clone)]
 pub(super) struct Field {
     dims: [usize; 3],
     spacing_mm: DVec3,

@@ -98,13 +98,40 @@ pub fn tetrahedra(mask: &VoxelVolume<u8>, config: &Config) -> Result<TetMesh, Me
 /// outer surface. Each label keeps the volume of its voxels within 0.2 % or one tetrahedron where
 /// the lattice can resolve it. A label smaller than a few cubes may be lost.
 pub fn labelled(labels: &VoxelVolume<u16>, config: &Config) -> Result<LabelledMesh, MeshError> {
-    check_config(config)?;
-    let mut regions = Regions::of(labels, |mm3| config.smoothing * search::uniform_spacing(mm3, config.target_tets))?;
-    let spacing = search::first_spacing(&regions, config);
-    regions.smooth(config.smoothing * spacing);
-    let mut labelled = search::search(&mut regions, config, spacing)?;
-    labelled.label_of_tet.iter_mut().for_each(|label| *label = regions.names[usize::from(*label)]);
-    Ok(labelled)
+    Domain::of(labels, config)?.labelled(config)
+}
+
+/// A label volume prepared for several meshes: the distance to each label's boundary.
+///
+/// The distances take most of the time of a mesh of few tetrahedra.
+pub struct Domain {
+    regions: Regions,
+}
+
+impl Domain {
+    /// Computes the distances, with a margin for the smoothing of the coarsest mesh that is wanted.
+    ///
+    /// # Errors
+    /// If the volume has no labels or too many, or a setting is out of range.
+    pub fn of(labels: &VoxelVolume<u16>, coarsest: &Config) -> Result<Self, MeshError> {
+        check_config(coarsest)?;
+        let most_mm = |mm3| coarsest.smoothing * search::uniform_spacing(mm3, coarsest.target_tets);
+        Ok(Self { regions: Regions::of(labels, most_mm)? })
+    }
+
+    /// Fills the labels with tetrahedra, as the function [`labelled`].
+    ///
+    /// # Errors
+    /// If a setting is out of range or no mesh has about the requested count.
+    pub fn labelled(&self, config: &Config) -> Result<LabelledMesh, MeshError> {
+        check_config(config)?;
+        let mut regions = self.regions.clone();
+        let spacing = search::first_spacing(&regions, config);
+        regions.smooth(config.smoothing * spacing);
+        let mut labelled = search::search(&mut regions, config, spacing)?;
+        labelled.label_of_tet.iter_mut().for_each(|label| *label = regions.names[usize::from(*label)]);
+        Ok(labelled)
+    }
 }
 
 fn check_config(config: &Config) -> Result<(), MeshError> {
@@ -205,6 +232,17 @@ mod tests {
             let radius = inner.positions[node as usize].length();
             assert!((radius - 14.0).abs() < 0.5, "{radius}");
         }
+    }
+
+    #[test]
+    fn one_domain_gives_the_meshes_of_every_config() {
+        let labels = volume_with([44; 3], millimetres(44), |p| u16::from(p.length() < 18.0));
+        let config = |target_tets| Config { target_tets, ..Config::default() };
+        let domain = Domain::of(&labels, &config(2_000)).unwrap();
+        assert_eq!(domain.labelled(&config(2_000)).unwrap(), labelled(&labels, &config(2_000)).unwrap());
+        let finer = domain.labelled(&config(9_000)).unwrap();
+        assert_sound(&finer.mesh, 9_000, 4.0 / 3.0 * std::f64::consts::PI * 18f64.powi(3));
+        assert_eq!(domain.labelled(&config(2_000)).unwrap(), labelled(&labels, &config(2_000)).unwrap());
     }
 
     #[test]

@@ -38,6 +38,7 @@ pub(super) trait Partition: Sync {
 }
 
 /// The regions of a label volume.
+#[derive(Clone)]
 pub(super) struct Regions {
     /// The volume's label of each region; the outside first.
     pub(super) names: Vec<u16>,

@@ -40,7 +40,7 @@ use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.
-const FORM: u32 = 17;
+const FORM: u32 = 18;
 /// Slides along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of a slide, mm.

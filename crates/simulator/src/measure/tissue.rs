@@ -167,6 +167,7 @@ pub struct Shape {
 /// Uniform meshes of a brain, for many scenes; refined meshes are built per scene.
 pub struct Brains<'a> {
     shape: &'a Shape,
+    domain: lattice::Domain,
     choices: Vec<Tissue>,
     meshes: Vec<(usize, TetMesh)>,
     /// Element of TLED.
@@ -181,16 +182,19 @@ impl<'a> Brains<'a> {
     /// # Errors
     /// If the mask cannot be meshed.
     pub fn of(shape: &'a Shape, choices: &[Tissue], element: Element) -> Result<Self, SessionError> {
+        let coarsest = lattice::Config { target_tets: TETS[0], ..lattice::Config::default() };
+        let labels = shape.mask.map(|voxel| u16::from(voxel != 0));
+        let domain = lattice::Domain::of(&labels, &coarsest).map_err(brain_error)?;
         let mut meshes: Vec<(usize, TetMesh)> = Vec::new();
         for choice in choices.iter().filter(|choice| choice.halvings == 0) {
             if !meshes.iter().any(|(tets, _)| *tets == choice.tets) {
-                meshes.push((choice.tets, meshed(shape, choice.tets, None)?));
+                meshes.push((choice.tets, meshed(&domain, choice.tets, None)?));
             }
         }
-        let mesh = meshed(shape, TETS[0], None)?;
+        let mesh = meshed(&domain, TETS[0], None)?;
         let body = Body::uniform(mesh.clone(), fixed_nodes(&mesh), shape.material);
         let damping = Tled::new(&body, &Config::default()).map_err(brain_error)?.damping_per_ms();
-        Ok(Self { shape, choices: choices.to_vec(), meshes, element, damping: Damping::Rate(damping) })
+        Ok(Self { shape, domain, choices: choices.to_vec(), meshes, element, damping: Damping::Rate(damping) })
     }
 
     /// Creates the solver of a choice.
@@ -219,9 +223,9 @@ impl<'a> Brains<'a> {
     }
 }
 
-fn meshed(shape: &Shape, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, SessionError> {
+fn meshed(domain: &lattice::Domain, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, SessionError> {
     let config = lattice::Config { target_tets, fine, ..lattice::Config::default() };
-    lattice::tetrahedra(&shape.mask, &config).map_err(brain_error)
+    domain.labelled(&config).map(|labelled| labelled.mesh).map_err(brain_error)
 }
 
 fn brain_error(fault: impl std::fmt::Display) -> SessionError {
@@ -294,7 +298,7 @@ impl Push {
         let on_surface = |p: Vec3| (0..4).fold(p, |p, _| p - shape.field.sample(p) * normal);
         let ends = [0.0, slide.length_mm].map(|mm| on_surface(slide.place + mm * slide.along(normal)));
         let middle = 0.5 * (ends[0] + ends[1]);
-        let mesh = refined(shape, truth, middle, normal)?;
+        let mesh = refined(&brains.domain, truth, middle, normal)?;
         let solver = &mut brains.tled_with_pressure(&mesh, true)?;
         let truth = run(slide, normal, ends, &mesh, solver, LONGEST_MS[0])?;
         Ok(Self { slide: *slide, normal, ends, truth })
@@ -310,7 +314,7 @@ impl Push {
         fineness: Fineness,
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
-        let mesh = refined(brains.shape, fineness, self.ends[0], self.normal)?;
+        let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
         self.found(&mesh, &mut brains.tled_with_pressure(&mesh, averaged_pressure)?, LONGEST_MS[0])
     }
 
@@ -322,7 +326,7 @@ impl Push {
         let one = |choice: &Tissue| {
             let (tets, halvings) = (choice.tets, choice.halvings);
             let refined = (halvings > 0)
-                .then(|| refined(brains.shape, Fineness::stepped(tets, halvings), self.ends[0], self.normal));
+                .then(|| refined(&brains.domain, Fineness::stepped(tets, halvings), self.ends[0], self.normal));
             let refined = refined.transpose()?;
             let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
             let mesh = refined.as_ref().or_else(alike).ok_or_else(|| brain_error("a mesh is missing"))?;
@@ -377,8 +381,8 @@ impl Push {
 }
 
 /// Builds a mesh refined around a place.
-fn refined(shape: &Shape, fineness: Fineness, place: Vec3, normal: Vec3) -> Result<TetMesh, SessionError> {
-    meshed(shape, fineness.tets, fineness.fine(place, normal))
+fn refined(domain: &lattice::Domain, fineness: Fineness, place: Vec3, normal: Vec3) -> Result<TetMesh, SessionError> {
+    meshed(domain, fineness.tets, fineness.fine(place, normal))
 }
 
 /// Runs push and slide.

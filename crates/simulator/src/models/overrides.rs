@@ -44,7 +44,7 @@ impl Overrides {
         Self {
             spacing_mm: number("spacing_mm"),
             tets: count("tets"),
-            halvings: count("halvings").filter(|n| *n <= 3).or(count("tets").map(|_| 0)).map(|n| n as u32),
+            halvings: count("halvings").filter(|n| *n <= 4).or(count("tets").map(|_| 0)).map(|n| n as u32),
             picture: detail.map(|detail| Picture { sparse: flag("picture_sparse"), detail }),
             ..Self::of(ingredients)
         }
