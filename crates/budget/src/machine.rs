@@ -83,6 +83,7 @@ pub(crate) fn check(machine: &Machine, scene: &Scene) -> Result<(), PlanError> {
     };
     let (press, motion) = (scene.press_mm, scene.tissue_motion_mm);
     limit("scene.press_mm", press, "at most scene.tool_radius_mm", press <= scene.tool_radius_mm)?;
-    limit("scene.tissue_motion_mm", motion, "at most scene.probe_radius_mm", motion <= scene.probe_radius_mm)?;
+    let deepest = 3.0 * scene.probe_radius_mm;
+    limit("scene.tissue_motion_mm", motion, "at most 3 of scene.probe_radius_mm", motion <= deepest)?;
     limit("scene.headroom", scene.headroom, "finite and 1 or more", scene.headroom >= 1.0)
 }

@@ -371,7 +371,9 @@ mod tests {
         assert!(refused(MACHINE, Scene { headroom: 0.5, ..scene() }).contains("headroom"));
         assert!(refused(MACHINE, Scene { brain_mm3: f64::NAN, ..scene() }).contains("brain_mm3"));
         assert!(refused(MACHINE, Scene { press_mm: 3.5, ..scene() }).contains("at most scene.tool_radius_mm"));
-        assert!(refused(MACHINE, Scene { tissue_motion_mm: 2.5, ..scene() }).contains("at most scene.probe_radius_mm"));
+        assert!(
+            refused(MACHINE, Scene { tissue_motion_mm: 6.5, ..scene() }).contains("at most 3 of scene.probe_radius_mm")
+        );
         assert!(refused(MACHINE, Scene { picture_pixels: [0, 600], ..scene() }).contains("picture_pixels[0]"));
         assert_eq!(plan_with(&MACHINE, &scene(), &Rows { bone: vec![], ..rows() }), Err(PlanError::NoRows("bone")));
     }

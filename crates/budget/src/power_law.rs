@@ -39,6 +39,14 @@ impl PowerLaw {
         Self { weights: [value.ln(), 0.0, 0.0, 0.0], spread: 0.0, bound: 0.0 }
     }
 
+    /// The law with these slopes through a value that was measured at some features.
+    #[must_use]
+    pub fn through(&self, at: &[f64; FEATURES], value: f64) -> Self {
+        let [w0, slopes @ ..] = self.weights;
+        let w0 = w0 + (value / self.expected(at)).ln();
+        Self { weights: [w0, slopes[0], slopes[1], slopes[2]], spread: 0.0, bound: 0.0 }
+    }
+
     /// The expected value.
     pub fn expected(&self, features: &[f64; FEATURES]) -> f64 {
         (self.weights[0] + self.weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>()).exp()

@@ -40,7 +40,7 @@ use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.
-const FORM: u32 = 18;
+const FORM: u32 = 19;
 /// Slides along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of a slide, mm.
@@ -116,17 +116,19 @@ impl CaseErrors {
         format!("own {FORM} {element:?} {lengths:?} {has:?} {names:?}")
     }
 
-    /// Replaces the power laws of the errors by the measured errors, for measured parts.
-    pub fn instead(&self, mut rows: Rows) -> Rows {
-        replace(&self.bone, MARGIN[0], &mut rows.bone);
-        replace(&self.tissue, MARGIN[1], &mut rows.tissue);
+    /// Replaces the power laws of a scene's errors by the measured errors, for measured parts.
+    /// Tissue that is pushed deeper than it was measured keeps the slope of its law.
+    pub fn instead(&self, mut rows: Rows, scene: &Scene) -> Rows {
+        let pushed = measured_in_tissue(scene).tissue_features();
+        replace(&self.bone, MARGIN[0], &mut rows.bone, |_, error| PowerLaw::constant(error));
+        replace(&self.tissue, MARGIN[1], &mut rows.tissue, |law, error| law.through(&pushed, error));
         for row in &mut rows.tissue {
             let name = row.what.write();
             let force = self.tissue_force.iter().find(|(of, _)| *of == name);
             row.force =
                 force.map(|(_, [error_n, force_n])| TissueForce { error_n: MARGIN[2] * error_n, force_n: *force_n });
         }
-        replace(&self.picture, MARGIN[3], &mut rows.picture);
+        replace(&self.picture, MARGIN[3], &mut rows.picture, |_, error| PowerLaw::constant(error));
         rows
     }
 
@@ -153,14 +155,19 @@ fn names<T: Kind>(rows: &[Row<T>]) -> Vec<Vec<String>> {
 
 /// Keeps only the measured rows, with the measured errors times a safety factor; a row with a power
 /// law could win by chance.
-fn replace<T: Kind>(found: &[(Vec<String>, f64)], margin: f64, rows: &mut Vec<Row<T>>) {
+fn replace<T: Kind>(
+    found: &[(Vec<String>, f64)],
+    margin: f64,
+    rows: &mut Vec<Row<T>>,
+    law: impl Fn(&PowerLaw, f64) -> PowerLaw,
+) {
     if found.is_empty() {
         return;
     }
     let measured = |row: &Row<T>| {
         let name = row.what.write();
         let (_, error) = found.iter().find(|(of, _)| *of == name)?;
-        Some(Row { error: PowerLaw::constant(margin * error), ..*row })
+        Some(Row { error: law(&row.error, margin * error), ..*row })
     };
     let measured: Vec<_> = rows.iter().filter_map(measured).collect();
     if !measured.is_empty() {
@@ -208,6 +215,12 @@ fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)>
     all.map(|(choice, error)| (choice.write(), error)).collect()
 }
 
+/// The scene in which errors in tissue are measured: no deeper than the tool's equator. Deeper, the
+/// tissue beside a rigid path is sheared without bound, and no mesh converges.
+fn measured_in_tissue(scene: &Scene) -> Scene {
+    Scene { tissue_motion_mm: scene.tissue_motion_mm.min(scene.probe_radius_mm), ..*scene }
+}
+
 fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec<(Vec<String>, tissue::Measurement)> {
     let ours = rows.tissue.iter().filter(|row| row.what.solver == "tled" && row.what.still_mm == 0.0);
     let features = scene.tissue_features();
@@ -216,7 +229,8 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec
     let Some((shape, place)) = sight.brain.as_ref().filter(|_| scene.has_tissue && !choices.is_empty()) else {
         return Vec::new();
     };
-    let slide = Slide { scene: *scene, place: *place, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
+    let scene = measured_in_tissue(scene);
+    let slide = Slide { scene, place: *place, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
     let found = || {
         let brains = Brains::of(shape, &choices, element)?;
         let push = Push::of(&slide, &brains, Fineness::QUICK)?;
@@ -277,7 +291,7 @@ mod tests {
         rows.picture.retain(|row| !row.what.sparse && [0.25, 0.5, 1.0].contains(&row.what.detail));
         let own = CaseErrors::of(&ball(), &scene, &rows, Element::Plain, 1);
         assert_eq!(own.has(), Parts { bone: true, tissue: false, picture: true });
-        let found = own.instead(rows.clone());
+        let found = own.instead(rows.clone(), &scene);
         let errors: Vec<f64> = found.bone.iter().map(|row| row.error.at_most(&scene.bone_features())).collect();
         assert!(errors.len() == 2 && errors[0] < 0.6 * errors[1], "{errors:?}");
         let errors: Vec<f64> = found.picture.iter().map(|row| row.error.at_most(&scene.picture_features())).collect();
@@ -308,19 +322,24 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_error_replaces_the_law() {
-        let scene = Scene::default();
+    fn a_measured_error_replaces_the_law_which_keeps_its_slope_for_deeper_pushes() {
+        let deep = Scene::default();
+        let scene = Scene { tissue_motion_mm: deep.probe_radius_mm, ..deep };
         let mut rows = Rows::stored().unwrap();
         let names = |row: &Row<Tissue>| row.what.write();
         let tissue = rows.tissue.iter().take(2).map(|row| (names(row), 2.0)).collect();
         let own = CaseErrors { tissue, ..CaseErrors::default() };
-        let found = own.instead(rows.clone()).tissue;
+        let found = own.instead(rows.clone(), &scene).tissue;
         rows.tissue.truncate(2);
         assert_eq!(found.iter().map(names).collect::<Vec<_>>(), rows.tissue.iter().map(names).collect::<Vec<_>>());
         for row in &found {
             let error = row.error.at_most(&scene.tissue_features());
             assert!((error - 2.0 * MARGIN[1]).abs() < 1e-9, "{error}");
         }
+        let law = found[0].error;
+        let over = law.at_most(&deep.tissue_features()) / law.at_most(&scene.tissue_features());
+        let times = deep.tissue_motion_mm / deep.probe_radius_mm;
+        assert!(times > 2.0 && (over - times.powf(law.weights[1])).abs() < 1e-9 && over > 1.2, "{over}");
     }
 
     #[test]
@@ -329,7 +348,7 @@ mod tests {
         let far = Sight { entry: 300.0 * Vec3::Z, ..ball() };
         let scene = Scene { picture_pixels: [64, 48], ..Scene::default() };
         let own = CaseErrors::of(&far, &scene, &rows, Element::Plain, 1);
-        assert_eq!(own.instead(rows.clone()).bone, rows.bone);
-        assert_eq!(CaseErrors::default().instead(rows.clone()), rows);
+        assert_eq!(own.instead(rows.clone(), &scene).bone, rows.bone);
+        assert_eq!(CaseErrors::default().instead(rows.clone(), &scene), rows);
     }
 }

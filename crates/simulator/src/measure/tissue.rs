@@ -34,9 +34,10 @@ use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Tetrahedra of the whole brain.
 const TETS: [usize; 3] = [3_000, 8_000, 20_000];
-/// Meshes refined at the opening: tetrahedra of the whole brain, and halvings of the edge length
-/// there.
-const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [3, 4]);
+/// Tetrahedra of the whole brain in meshes refined at the opening.
+const REFINED_TETS: [usize; 5] = [3_000, 5_000, 8_000, 12_000, 20_000];
+/// Halvings of the edge length there. Three err by more at the same cost.
+const HALVINGS: u32 = 4;
 /// A mesh that the other solvers can step in real time.
 const RIVALS_TETS: usize = 3_000;
 
@@ -112,11 +113,11 @@ const FIXED_SHARE: f32 = 0.35;
 /// All choices for tissue.
 pub fn choices() -> Vec<Tissue> {
     let choice = |solver, tets| Tissue { solver, tets, halvings: 0, still_mm: 0.0 };
-    let refined = |halvings| FINER.0.map(|tets| Tissue { halvings, ..choice("tled", tets) });
+    let refined = REFINED_TETS.map(|tets| Tissue { halvings: HALVINGS, ..choice("tled", tets) });
     let names = Method::all().into_iter().filter(|m| !m.descriptor().is_static).map(|m| m.name());
     let rivals = names.map(|solver| choice(solver, RIVALS_TETS));
     let tled = TETS.map(|tets| choice("tled", tets)).into_iter();
-    tled.chain(FINER.1.into_iter().flat_map(refined)).chain(rivals).collect()
+    tled.chain(refined).chain(rivals).collect()
 }
 
 /// Measured error and cost of a choice.

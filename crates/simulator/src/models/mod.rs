@@ -219,7 +219,7 @@ impl ModelRequest {
             asked.picture.clear();
         }
         let case_errors = case_errors(&scene, &asked, self.given.ingredients.element)?;
-        let plan = trepan_budget::plan_with(&machine, &scene, &case_errors.instead(rows)).map_err(internal)?;
+        let plan = trepan_budget::plan_with(&machine, &scene, &case_errors.instead(rows, &scene)).map_err(internal)?;
         Ok((plan, case_errors.has()))
     }
 
@@ -239,7 +239,7 @@ impl ModelRequest {
             stiffness: BONE_STIFFNESS.into(),
             press_mm: PRESS_N / f64::from(BONE_STIFFNESS),
             tool_radius_mm: thinnest(ToolKind::Burr).unwrap_or(usual.tool_radius_mm),
-            tissue_motion_mm: usual.tissue_motion_mm.min(probe_radius_mm),
+            tissue_motion_mm: usual.tissue_motion_mm.min(3.0 * probe_radius_mm),
             probe_radius_mm,
             finest_mm: facts.ct_voxel_mm.unwrap_or(usual.finest_mm),
             brain_mm3: facts.brain_mm3.unwrap_or(usual.brain_mm3),

@@ -82,7 +82,7 @@ fn note(name: &str, situation: &Situation, rows: &Rows, own: &CaseErrors, found:
     let holds_walls = |(row, _): &(Laws<Bone>, f64)| holds_walls(&row.what, scene.tool_radius_mm);
     let (holding, on_bone): (Vec<_>, Vec<_>) = rows.bone.iter().copied().zip(on_bone).filter(holds_walls).unzip();
     let rows = &Rows { bone: holding, ..rows.clone() };
-    let looked_at = own.instead(rows.clone());
+    let looked_at = own.instead(rows.clone(), &situation.scene);
     let machine = &situation.machine;
     let plan = plan_with(machine, scene, &looked_at).expect("the scene is sound");
     let (bone, tissue, picture) =
