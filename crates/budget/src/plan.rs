@@ -250,7 +250,7 @@ mod tests {
 
     fn rows() -> Rows {
         let bone = |spacing_mm| Bone { method: "god-object-sphere", spacing_mm, points: 0 };
-        let tissue = |tets| Tissue { solver: "tled", tets, halvings: 0, still_mm: 0.0 };
+        let tissue = |tets| Tissue { solver: "tled", tets, halvings: 0 };
         let picture = |detail| Picture { sparse: detail < 1.0, detail };
         Rows {
             bone: vec![row(bone(1.0), 0.1, 0.8), row(bone(0.5), 0.04, 1.0), row(bone(0.25), 0.02, 2.0)],

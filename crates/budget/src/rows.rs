@@ -163,17 +163,16 @@ impl Kind for Bone {
 
 impl Kind for Tissue {
     const TABLE: &'static str = "tissue.csv";
-    const KEYS: &'static [&'static str] = &["solver", "tets", "halvings", "still_mm"];
+    const KEYS: &'static [&'static str] = &["solver", "tets", "halvings"];
     const FEATURES: [&'static str; FEATURES] = ["motion", "radius", "volume"];
 
     fn read(keys: &[&'static str]) -> Option<Self> {
-        let [solver, tets, halvings, still] = keys else { return None };
-        let (tets, halvings) = (tets.parse().ok()?, halvings.parse().ok()?);
-        Some(Self { solver, tets, halvings, still_mm: still.parse().ok()? })
+        let [solver, tets, halvings] = keys else { return None };
+        Some(Self { solver, tets: tets.parse().ok()?, halvings: halvings.parse().ok()? })
     }
 
     fn write(&self) -> Vec<String> {
-        vec![self.solver.into(), self.tets.to_string(), self.halvings.to_string(), self.still_mm.to_string()]
+        vec![self.solver.into(), self.tets.to_string(), self.halvings.to_string()]
     }
 }
 

@@ -23,9 +23,6 @@ pub struct Tissue {
     /// How often the tetrahedra's edges are halved around the opening, at the same total count; 0
     /// for a uniform mesh.
     pub halvings: u32,
-    /// Region of interest: nodes that move less than this in 50 ms sleep, mm (`still_mm` of
-    /// `trepan_tled::Config`). 0 steps all of them.
-    pub still_mm: f64,
 }
 
 /// How the processor renders the 3-D view.
@@ -70,7 +67,7 @@ impl Quality {
     pub fn preset(self) -> Option<Setup> {
         let setup = |spacing_mm, tets, sparse, detail| Setup {
             bone: Bone { method: "god-object-sphere", spacing_mm, points: 0 },
-            tissue: Tissue { solver: "tled", tets, halvings: 4, still_mm: 0.0 },
+            tissue: Tissue { solver: "tled", tets, halvings: 4 },
             picture: Picture { sparse, detail },
         };
         Some(match self {
@@ -105,7 +102,7 @@ impl fmt::Display for Tissue {
         if self.halvings > 0 {
             write!(f, ", edges 1/{} at the opening", 1u64 << self.halvings)?;
         }
-        if self.still_mm > 0.0 { write!(f, ", what moves over {} mm", self.still_mm) } else { Ok(()) }
+        Ok(())
     }
 }
 
@@ -141,8 +138,8 @@ mod tests {
             usual.to_string(),
             "god-object-sphere on 1 mm voxels; tled with 8000 tetrahedra, edges 1/16 at the opening; every ray"
         );
-        let alike = Tissue { halvings: 0, still_mm: 0.01, ..draft.tissue };
-        assert_eq!(alike.to_string(), "tled with 3000 tetrahedra, what moves over 0.01 mm");
+        let alike = Tissue { halvings: 0, ..draft.tissue };
+        assert_eq!(alike.to_string(), "tled with 3000 tetrahedra");
         assert_eq!(draft.picture.to_string(), "sparse rays at 0.5 of the pixels along an edge");
     }
 }

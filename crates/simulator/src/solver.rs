@@ -69,7 +69,7 @@ pub(crate) fn build(
     if let Some(method) = trepan_soft::Method::named(tissue.solver) {
         return Ok((method.build(body).map_err(refused)?, Ran::here(method.name())));
     }
-    let config = Config { still_mm: tissue.still_mm as f32, ..ingredients.config() };
+    let config = ingredients.config();
     let (on_card, remark) = match ingredients.device {
         SolverDevice::Cpu => (None, None),
         SolverDevice::Fastest if ingredients.surface_pressure_mmhg > 0.0 => (None, None),
@@ -106,12 +106,14 @@ impl Ingredients {
     pub(crate) fn config(&self) -> Config {
         Config {
             mass_scaling: MASS_ADDED,
+            squeezed_mass: self.squeezed_mass,
             averaged_pressure: self.element == Element::LockingFree,
             relaxation: match self.relaxation {
                 Relaxation::Off => trepan_tled::Relaxation::NONE,
                 Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
             },
             threads: self.threads.unwrap_or(1),
+            still_mm: if self.steps_all() { 0.0 } else { self.still_mm },
             ..Config::default()
         }
     }
@@ -175,7 +177,7 @@ mod tests {
     use trepan_geometry::Vec3;
     use trepan_soft::boxes;
 
-    const TLED: Tissue = Tissue { solver: "tled", tets: 0, halvings: 0, still_mm: 0.0 };
+    const TLED: Tissue = Tissue { solver: "tled", tets: 0, halvings: 0 };
 
     /// A block of brain, 30 mm wide, fixed at the bottom.
     fn block(laws: &Ingredients) -> Body {

@@ -19,6 +19,7 @@ use crate::lane::{Lane, NODES, Quad, WIDTH};
 use crate::law::{Constitutive, Deformation, Stress};
 use crate::pass::{Pass, PassReport};
 use crate::relaxation::Fade;
+use crate::squeeze::Squeeze;
 use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
 use trepan_soft::{Material, Shape, element_omega2};
@@ -59,6 +60,11 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     /// Mean `J - 1` by node; read with averaged pressure only.
     pub averages: &'a [f32; NODES],
     pub sums: &'a mut [Quad; NODES],
+    /// A quarter of each element's mass, g, by block.
+    pub quarter_mass: &'a [[f32; WIDTH]],
+    pub squeeze: Squeeze,
+    /// Mass for nodes of squeezed elements: node of the part, and g.
+    pub added: &'a mut Vec<(u32, f32)>,
     pub law: PhantomData<M>,
 }
 
@@ -182,7 +188,12 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let moduli = M::moduli(&constants);
                 let gained = stiffness(&stress, moduli, &d, volume_change)
                     - stiffness_at_rest(M::stress_at_rest(&constants), moduli);
-                growth = (L::load(&block.omega2, part) * gained).larger(growth);
+                let mut grown = L::load(&block.omega2, part) * gained;
+                if (L::splat(self.squeeze.limit) - grown).not_positive() > 0 {
+                    grown =
+                        self.squeeze.weigh(grown, part, (block.corners::<L>(part), &self.quarter_mass[i]), self.added);
+                }
+                growth = grown.larger(growth);
                 if T > 0 {
                     relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
                 }

@@ -26,7 +26,7 @@ pub(crate) struct Bound {
     /// Stable step at rest, ms.
     pub at_rest_ms: f32,
     /// Largest ω² of an element at rest, with scaled mass, 1/ms².
-    stiffest: f32,
+    pub stiffest: f32,
 }
 
 impl Bound {

@@ -10,6 +10,7 @@ use crate::part::{Forcing, Part, PartGroups, Quiet};
 use crate::pass::PassReport;
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
+use crate::squeeze::Squeeze;
 use crate::team::{Team, Work};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
@@ -24,11 +25,18 @@ pub(crate) struct Elements {
     team: Team,
     averaged_pressure: bool,
     relaxation: Relaxation,
+    squeeze: Squeeze,
     still_mm: f32,
 }
 
 impl Elements {
-    pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, nodes: Nodes, config: &Config) -> Self {
+    pub fn of(
+        body: &Body,
+        layout: &Layout,
+        (scaling, squeeze): (&Scaling, Squeeze),
+        nodes: Nodes,
+        config: &Config,
+    ) -> Self {
         let node_groups = NodeGroups::of(body, layout, config.averaged_pressure);
         let inverse_volume =
             if config.averaged_pressure { node_groups.inverse_volumes(body, layout) } else { Vec::new() };
@@ -46,6 +54,7 @@ impl Elements {
             team: Team::of(parts, nodes, force_slots, config.kernel.resolved(), config.threads),
             averaged_pressure: config.averaged_pressure,
             relaxation: config.relaxation,
+            squeeze,
             still_mm: config.still_mm,
         }
     }
@@ -66,9 +75,18 @@ impl Elements {
 
     /// Computes every element's forces from the nodes' displacements, `dt_ms` after the last step.
     pub fn forces(&mut self, dt_ms: f32) -> PassReport {
-        let (fade, averaged_pressure) = (self.relaxation.fade(dt_ms), self.averaged_pressure);
-        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, quiet: self.quiet(dt_ms) }));
+        let Self { averaged_pressure, squeeze, .. } = *self;
+        let (fade, quiet) = (self.relaxation.fade(dt_ms), self.quiet(dt_ms));
+        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, squeeze, quiet }));
         self.team.report()
+    }
+
+    /// Adds the mass for squeezed elements to their nodes for the rest of a step, or takes it away
+    /// again.
+    pub fn weigh(&self, adds: bool) {
+        if self.squeeze != Squeeze::NONE {
+            self.team.weigh(adds);
+        }
     }
 
     fn quiet(&self, dt_ms: f32) -> Quiet {
@@ -145,13 +163,21 @@ mod tests {
             let nodes = Nodes::of(body, &layout, &body.lumped_masses_g());
             (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
             let config = Config { kernel, averaged_pressure: averaged, relaxation, threads, ..Config::default() };
-            let mut elements = Elements::of(body, &layout, &Scaling::of(body, 0.0), nodes, &config);
+            let scaling = Scaling::of(body, 0.0);
+            let squeeze =
+                Squeeze { limit: 0.1 * scaling.stiffest as f32, stiffest: scaling.stiffest as f32, most: 4.0 };
+            let mut elements = Elements::of(body, &layout, (&scaling, squeeze), nodes, &config);
             let mut compute = || {
                 elements.volumes(0.7);
                 elements.forces(0.7)
             };
             let report = (0..3).map(|_| compute()).last();
-            (report, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
+            elements.weigh(true);
+            let masses: Vec<f32> = (0..count).map(|place| elements.nodes().present_inverse_mass(place)).collect();
+            assert!(masses != elements.nodes().inverse_mass);
+            elements.weigh(false);
+            assert!((0..count).all(|n| elements.nodes().present_inverse_mass(n) == elements.nodes().inverse_mass[n]));
+            (report, masses, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar, 1);
         for kernel in Kernel::all().into_iter().filter(|k| k.runs_here()) {
@@ -159,8 +185,8 @@ mod tests {
                 assert_eq!(scalar, forces(kernel, threads), "{} {threads} {:?}", kernel.name(), body.materials);
             }
         }
-        let total: Vec3 = scalar.1.iter().map(|f| Vec3::from_array(*f)).sum();
-        let largest = scalar.1.iter().flatten().fold(0.0f32, |m, f| m.max(f.abs()));
+        let total: Vec3 = scalar.2.iter().map(|f| Vec3::from_array(*f)).sum();
+        let largest = scalar.2.iter().flatten().fold(0.0f32, |m, f| m.max(f.abs()));
         assert!(largest > 0.0 && total.length() < 1e-5 * largest, "{total} {largest}");
     }
 }

@@ -61,6 +61,7 @@ mod principal;
 mod relaxation;
 mod scaling;
 mod settle;
+mod squeeze;
 mod stiffness;
 mod team;
 mod tled;

@@ -30,6 +30,9 @@ pub(crate) struct Nodes {
     pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
+    /// Mass that squeezed elements add in this step, g; 0 everywhere while `is_heavier` is false.
+    added: Scalars,
+    is_heavier: AtomicBool,
     /// Share of the mass that has weight (scaled mass has none).
     weight: Vec<f32>,
     rest: Vec<Vec4>,
@@ -109,6 +112,8 @@ impl Nodes {
             is_pushed: AtomicBool::new(false),
             pushed: Scalars::zeroed(layout.node_at.len()),
             inverse_mass,
+            added: Scalars::zeroed(layout.node_at.len()),
+            is_heavier: AtomicBool::new(false),
             weight,
             rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize].extend(0.0)).collect(),
             limited: AtomicU32::new(0),
@@ -125,6 +130,7 @@ impl Nodes {
         // Unneeded fields are neither read nor written: the update is limited by memory bandwidth,
         // about 100 bytes a node.
         let (anything_pushes, may_sleep) = (self.is_pushed.load(Relaxed), update.calm_mm > 0.0);
+        let is_heavier = self.is_heavier.load(Relaxed);
         for place in places {
             let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
             if inverse_mass == 0.0 {
@@ -136,7 +142,8 @@ impl Nodes {
             let (mut force, external) = (force_slots.force(place), self.take_external(place, anything_pushes));
             let is_beside_sleepers = force.w > 0.0;
             force.w = 0.0;
-            let pull = gravity * self.weight[place] + (force + external) * inverse_mass;
+            let lightness = if is_heavier { self.lightness(place) } else { 1.0 };
+            let pull = (gravity * self.weight[place] + (force + external) * inverse_mass) * lightness;
             let mut is_pushed = external != Vec4::ZERO;
             if is_beside_sleepers {
                 is_pushed |= pull.length() * dt_ms * dt_ms > update.calm_mm;
@@ -168,7 +175,30 @@ impl Nodes {
         }
         let [keep, gain] = update.keep_and_gain();
         let carried = update.carried(self.rest[place] + u, v, keep).truncate();
-        carried + (update.gravity * self.weight[place] + force * inverse_mass) * gain
+        carried + (update.gravity * self.weight[place] + force * inverse_mass) * (self.lightness(place) * gain)
+    }
+
+    /// 1/m with the mass that squeezed elements add, 1/g.
+    pub fn present_inverse_mass(&self, place: usize) -> f32 {
+        self.inverse_mass[place] * self.lightness(place)
+    }
+
+    /// A node's mass without over that with what squeezed elements add; 1 for a fixed node.
+    #[inline(always)]
+    fn lightness(&self, place: usize) -> f32 {
+        1.0 / (1.0 + self.added.get(place) * self.inverse_mass[place])
+    }
+
+    /// Adds mass to the node at a place, g.
+    pub fn add_mass(&self, place: usize, grams: f32) {
+        self.is_heavier.store(true, Relaxed);
+        self.added.set(place, self.added.get(place) + grams);
+    }
+
+    /// Takes the added mass of the node at a place away.
+    pub fn take_mass(&self, place: usize) {
+        self.is_heavier.store(false, Relaxed);
+        self.added.set(place, 0.0);
     }
 
     /// Takes and clears the external force on the node at a place, N.

@@ -29,6 +29,7 @@ use crate::nodes::Nodes;
 use crate::pass::PassReport;
 use crate::relaxation::Fade;
 use crate::scaling::Scaling;
+use crate::squeeze::Squeeze;
 use glam::Vec4;
 use std::marker::PhantomData;
 use trepan_soft::{Body, Law};
@@ -42,6 +43,8 @@ pub(crate) struct Part {
     /// A quarter of the volume change of the elements around each node, mm³; then the mean `J - 1`
     /// of its node group.
     volumes: Box<[f32; NODES]>,
+    /// Mass for nodes of squeezed elements in the last force pass: node of the part, and g.
+    added: Vec<(u32, f32)>,
     /// Report of the last force pass.
     pub report: PassReport,
     tets: usize,
@@ -62,6 +65,7 @@ pub(crate) const CALM: f32 = 0.1;
 pub(crate) struct Forcing {
     pub fade: [Fade; 2],
     pub averaged_pressure: bool,
+    pub squeeze: Squeeze,
     pub quiet: Quiet,
 }
 
@@ -88,9 +92,9 @@ trait LawElements: Send {
     fn forces(
         &mut self,
         kernel: Kernel,
-        fade: [Fade; 2],
+        how: &Forcing,
         of: (&[Quad; NODES], &[f32; NODES]),
-        sums: &mut [Quad; NODES],
+        out: (&mut [Quad; NODES], &mut Vec<(u32, f32)>),
     ) -> PassReport;
     fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]);
     fn forget(&mut self);
@@ -101,6 +105,8 @@ struct Blocks<M, const K: usize, const T: usize> {
     memory: Vec<Memory<T>>,
     /// Of every block with averaged pressure, else empty.
     strains: Vec<Strain>,
+    /// A quarter of each element's mass, g, by block.
+    quarter_mass: Vec<[f32; WIDTH]>,
     law: PhantomData<M>,
 }
 
@@ -122,6 +128,7 @@ impl Part {
             u: bytemuck::zeroed_box(),
             sums: bytemuck::zeroed_box(),
             volumes: bytemuck::zeroed_box(),
+            added: Vec::with_capacity(4 * tets.len()),
             report: PassReport::default(),
             tets: tets.len(),
             anchor: zero,
@@ -161,12 +168,19 @@ impl Part {
         }
         let used = self.groups.places.len();
         self.sums[..used].fill([0.0; 4]);
-        self.report = self.elements.forces(kernel, how.fade, (&self.u, &self.volumes), &mut self.sums);
+        self.added.clear();
+        let out = (&mut *self.sums, &mut self.added);
+        self.report = self.elements.forces(kernel, how, (&self.u, &self.volumes), out);
         if self.quiet_ms > DOZE_MS {
             self.quiet_ms = f32::INFINITY;
             self.sums[..used].iter_mut().for_each(|sum| sum[3] = 1.0);
         }
         self.groups.slots.iter().zip(&*self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
+    }
+
+    /// Mass for nodes of elements that were squeezed in the last force pass: place, and g.
+    pub fn added(&self) -> impl Iterator<Item = (usize, f32)> {
+        self.added.iter().map(|&(node, grams)| (self.groups.places[node as usize] as usize, grams))
     }
 
     /// Number of elements, and number of awake elements.
@@ -238,12 +252,15 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Blocks<M, K, T> {
     ) -> Self {
         let mut blocks = vec![Block::empty(); tets.len().div_ceil(WIDTH)];
         let count = blocks.len();
+        let mut quarter_mass = vec![[0.0; WIDTH]; count];
         for (at, &t) in tets.iter().enumerate() {
+            let grams = f64::from(body.material(t as usize).density_g_mm3()) * body.mesh.volume_mm3(t as usize);
+            quarter_mass[at % count][at / count] = (0.25 * grams * scaling.factor(t)) as f32;
             let tissue = (&body.shape(t as usize), body.material(t as usize), scaling.factor(t));
             blocks[at % count].put::<M>(at / count, tissue, nodes(t));
         }
         let strains = vec![Strain::NONE; if averaged_pressure { count } else { 0 }];
-        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; count], blocks, strains, law: PhantomData }
+        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; count], blocks, strains, quarter_mass, law: PhantomData }
     }
 }
 
@@ -251,12 +268,24 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
     fn forces(
         &mut self,
         kernel: Kernel,
-        fade: [Fade; 2],
+        &Forcing { fade, squeeze, .. }: &Forcing,
         (u, averages): (&[Quad; NODES], &[f32; NODES]),
-        sums: &mut [Quad; NODES],
+        (sums, added): (&mut [Quad; NODES], &mut Vec<(u32, f32)>),
     ) -> PassReport {
-        let Self { blocks, memory, strains, law } = self;
-        kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, strains, averages, sums, law: *law })
+        let Self { blocks, memory, strains, quarter_mass, law } = self;
+        kernel.run(&mut Forces::<M, K, T> {
+            blocks,
+            memory,
+            fade,
+            u,
+            strains,
+            averages,
+            sums,
+            quarter_mass,
+            squeeze,
+            added,
+            law: *law,
+        })
     }
 
     fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]) {

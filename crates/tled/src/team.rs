@@ -146,6 +146,18 @@ impl Team {
         self.shared.parts.iter().fold(PassReport::default(), add)
     }
 
+    /// Adds the mass for squeezed elements to their nodes, or takes it away again.
+    pub fn weigh(&self, adds: bool) {
+        let nodes = self.nodes();
+        for part in &self.shared.parts {
+            lock(part).added().for_each(
+                |(place, grams)| {
+                    if adds { nodes.add_mass(place, grams) } else { nodes.take_mass(place) }
+                },
+            );
+        }
+    }
+
     /// Number of elements, and number of awake elements.
     pub fn awake(&self) -> [usize; 2] {
         let add = |[a, b]: [usize; 2], [x, y]: [usize; 2]| [a + x, b + y];

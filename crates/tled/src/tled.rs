@@ -62,8 +62,10 @@ impl Tled {
         let substeps = if self.base.config.substeps == 0 { 1.0 } else { self.base.substeps(left_ms, pass.growth) };
         let dt_ms = left_ms / substeps;
         let update = self.update_of(loads, dt_ms);
+        self.elements.weigh(true);
         self.press(loads, &update, report);
         self.update(update, report);
+        self.elements.weigh(false);
         dt_ms
     }
 
@@ -75,7 +77,7 @@ impl Tled {
         let free = |n: u32| FreeNode {
             position: nodes.position(place(n)),
             velocity: nodes.free_velocity(place(n), elements.force(place(n)), update),
-            inverse_mass: nodes.inverse_mass[place(n)],
+            inverse_mass: nodes.present_inverse_mass(place(n)),
         };
         let step = Gain { dt_ms: update.dt_ms, gain_ms: update.keep_and_gain()[1] };
         report.contact_n = self.springs.press(&loads.contacts, step, free, |n, force| nodes.push(place(n), force));
@@ -115,7 +117,7 @@ impl Tled {
         Ok(Self {
             gravity: Vec3::ZERO,
             growth: 0.0,
-            elements: Elements::of(body, &base.layout, &scaling, nodes, config),
+            elements: Elements::of(body, &base.layout, (&scaling, base.squeeze()), nodes, config),
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             mass_added: scaling.added as f32,

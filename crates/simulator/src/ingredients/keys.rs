@@ -141,7 +141,6 @@ pub const KEYS: &[Key] = &[
         set: |i, text| {
             let rival = trepan_soft::Method::named(text).map(|method| method.name());
             i.solver = Some(rival.or([TLED, FASTEST].contains(&text).then_some(TLED))?);
-            i.still_mm = Some(0.0);
             i.device = if text == FASTEST { SolverDevice::Fastest } else { i.device };
             Some(())
         },
@@ -151,9 +150,20 @@ pub const KEYS: &[Key] = &[
         name: "still-mm",
         values: || "0 to 1 mm".into(),
         about: "region of interest: tissue that moves less in 50 ms sleeps; 0 steps all of it",
+        usual: Some("0"),
         compared: || vec!["0.01".into()],
-        get: |i| i.still_mm.map(|mm| mm.to_string()),
-        set: |i, text| number(text, 1.0).map(|mm| i.still_mm = Some(mm)),
+        get: |i| Some(i.still_mm.to_string()),
+        set: |i, text| number(text, 1.0).map(|mm| i.still_mm = mm as f32),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "squeezed-mass",
+        values: || "1 to 64".into(),
+        about: "largest factor on the mass of an element that is squeezed, which keeps the step long; 1: none",
+        usual: Some("16"),
+        compared: || vec!["1".into()],
+        get: |i| Some(i.squeezed_mass.to_string()),
+        set: |i, text| number(text, 64.0).filter(|most| *most >= 1.0).map(|most| i.squeezed_mass = most as f32),
         ..Key::of(Part::Tled)
     },
     Key {
@@ -524,6 +534,7 @@ mod tests {
             "vibration=off",
             "solver=tled",
             "still-mm=0.01",
+            "squeezed-mass=4",
             "element=locking-free",
             "law=ogden",
             "law.grey=mooney-rivlin",

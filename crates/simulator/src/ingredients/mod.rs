@@ -36,7 +36,9 @@ pub struct Ingredients {
     /// Solver of the tissue.
     pub solver: Option<&'static str>,
     /// Motion in 50 ms below which tissue sleeps, mm; 0 = nothing sleeps.
-    pub still_mm: Option<f64>,
+    pub still_mm: f32,
+    /// Largest factor on the mass of a squeezed element, without unit; 1 = none.
+    pub squeezed_mass: f32,
     /// Tetrahedral element.
     pub element: Element,
     /// Constitutive law of each tissue class, in the order of [`TissueClass::ALL`].
@@ -56,6 +58,9 @@ pub struct Ingredients {
     /// Contact of the brain's surface with itself.
     pub folds: bool,
 }
+
+/// Usual [`Ingredients::squeezed_mass`].
+pub(crate) const SQUEEZED_MASS: f32 = 16.0;
 
 /// Tetrahedral elements of the solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -95,7 +100,8 @@ impl Default for Ingredients {
             bone_friction: 0.0,
             vibration: true,
             solver: None,
-            still_mm: None,
+            still_mm: 0.0,
+            squeezed_mass: SQUEEZED_MASS,
             element: Element::Plain,
             laws: [Law::NeoHookean; TissueClass::ALL.len()],
             relaxation: Relaxation::Off,

@@ -222,7 +222,7 @@ fn measured_in_tissue(scene: &Scene) -> Scene {
 }
 
 fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec<(Vec<String>, tissue::Measurement)> {
-    let ours = rows.tissue.iter().filter(|row| row.what.solver == "tled" && row.what.still_mm == 0.0);
+    let ours = rows.tissue.iter().filter(|row| row.what.solver == "tled");
     let features = scene.tissue_features();
     let of = |row: &Row<Tissue>| [row.error.at_most(&features), tissue_cores(&Machine::default(), scene, row)];
     let choices = front(ours.map(|row| (row, of(row))).collect());

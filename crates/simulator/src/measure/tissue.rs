@@ -19,7 +19,7 @@
 
 use super::bone::Slide;
 use crate::error::SessionError;
-use crate::ingredients::Element;
+use crate::ingredients::{Element, SQUEEZED_MASS};
 use crate::run::clock::Clock;
 use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::TriMesh;
@@ -87,8 +87,6 @@ const TRUTH_MM: [f32; 2] = [8.0, 5.0];
 /// Largest mass that mass scaling adds, as a share of the brain's mass; the weight is unchanged. It
 /// is added to the elements with the shortest stable time steps: slivers and refined ones.
 pub const MASS_ADDED: f32 = 0.01;
-/// Cost of a sleeping tetrahedron, as a share of an awake one's.
-const ASLEEP: f64 = 0.1;
 /// Sample points of the ball's surface, each on the triangle under it; denser than the nodes of a
 /// ground truth.
 const PLACES: u32 = 199;
@@ -112,7 +110,7 @@ const FIXED_SHARE: f32 = 0.35;
 
 /// All choices for tissue.
 pub fn choices() -> Vec<Tissue> {
-    let choice = |solver, tets| Tissue { solver, tets, halvings: 0, still_mm: 0.0 };
+    let choice = |solver, tets| Tissue { solver, tets, halvings: 0 };
     let refined = REFINED_TETS.map(|tets| Tissue { halvings: HALVINGS, ..choice("tled", tets) });
     let names = Method::all().into_iter().filter(|m| !m.descriptor().is_static).map(|m| m.name());
     let rivals = names.map(|solver| choice(solver, RIVALS_TETS));
@@ -127,9 +125,8 @@ pub struct Measurement {
     pub error_mm: f64,
     /// Force of the tool and its error, the worse of push and slide.
     pub force: TissueForce,
-    /// Work of a TLED step, as a share of one substep with all tetrahedra awake; for other solvers
-    /// the number of substeps.
-    pub work: f64,
+    /// Mean number of substeps of a step.
+    pub substeps: f64,
     /// Mean time step, ms.
     pub dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
@@ -141,7 +138,7 @@ pub struct Measurement {
 pub fn cost(at: usize, choices: &[Tissue], found: &[Measurement], scene: &Scene) -> f64 {
     let (choice, of) = (&choices[at], &found[at]);
     let of_step = match choice.solver {
-        "tled" => of.work,
+        "tled" => of.substeps,
         _ => of.ns / found[unit(choices)].ns,
     };
     of_step * dt_ms(scene, choice) / of.dt_ms
@@ -150,7 +147,7 @@ pub fn cost(at: usize, choices: &[Tissue], found: &[Measurement], scene: &Scene)
 /// Index of the choice that other solvers are compared with: TLED as the machine's measure steps
 /// it.
 fn unit(choices: &[Tissue]) -> usize {
-    let is = |c: &Tissue| (c.solver, c.tets, c.halvings, c.still_mm) == ("tled", RIVALS_TETS, 0, 0.0);
+    let is = |c: &Tissue| (c.solver, c.tets, c.halvings) == ("tled", RIVALS_TETS, 0);
     choices.iter().position(is).expect("it is a choice")
 }
 
@@ -199,28 +196,23 @@ impl<'a> Brains<'a> {
     }
 
     /// Creates the solver of a choice.
-    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn Solver>, SessionError> {
-        let body = Body::uniform(mesh.clone(), fixed_nodes(mesh), self.shape.material);
+    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn SoftSolver>, SessionError> {
         match Method::named(choice.solver) {
-            Some(method) => Ok(Box::new(method.build(&body).map_err(brain_error)?)),
-            None => {
-                let averaged_pressure = self.element == Element::LockingFree;
-                let still_mm = choice.still_mm as f32;
-                Ok(Box::new(self.tled(&body, Config { still_mm, averaged_pressure, ..Config::default() })?))
-            }
+            Some(method) => method.build(&self.body(mesh)).map_err(brain_error),
+            None => Ok(Box::new(self.tled(mesh, self.element == Element::LockingFree, SQUEEZED_MASS)?)),
         }
     }
 
-    /// Creates TLED with or without averaged nodal pressure.
-    fn tled_with_pressure(&self, mesh: &TetMesh, averaged_pressure: bool) -> Result<Tled, SessionError> {
-        let body = Body::uniform(mesh.clone(), fixed_nodes(mesh), self.shape.material);
-        self.tled(&body, Config { averaged_pressure, ..Config::default() })
+    /// Creates TLED with the settings of a session; with or without averaged nodal pressure.
+    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, squeezed_mass: f32) -> Result<Tled, SessionError> {
+        let damping = self.damping;
+        let config =
+            Config { mass_scaling: MASS_ADDED, squeezed_mass, damping, averaged_pressure, ..Config::default() };
+        Tled::new(&self.body(mesh), &config).map_err(brain_error)
     }
 
-    /// Creates TLED with the settings of a session.
-    fn tled(&self, body: &Body, config: Config) -> Result<Tled, SessionError> {
-        let config = Config { mass_scaling: MASS_ADDED, damping: self.damping, ..config };
-        Tled::new(body, &config).map_err(brain_error)
+    fn body(&self, mesh: &TetMesh) -> Body {
+        Body::uniform(mesh.clone(), fixed_nodes(mesh), self.shape.material)
     }
 }
 
@@ -231,33 +223,6 @@ fn meshed(domain: &lattice::Domain, target_tets: usize, fine: Option<lattice::Fi
 
 fn brain_error(fault: impl std::fmt::Display) -> SessionError {
     SessionError::Internal(format!("measuring the brain: {fault}"))
-}
-
-/// A solver of either crate, with the relative work of its last step.
-trait Solver {
-    fn seam(&mut self) -> &mut dyn SoftSolver;
-
-    fn work(&self) -> f64;
-}
-
-impl Solver for Tled {
-    fn seam(&mut self) -> &mut dyn SoftSolver {
-        self
-    }
-
-    fn work(&self) -> f64 {
-        ASLEEP + (1.0 - ASLEEP) * f64::from(self.awake_share())
-    }
-}
-
-impl Solver for Box<dyn SoftSolver> {
-    fn seam(&mut self) -> &mut dyn SoftSolver {
-        self.as_mut()
-    }
-
-    fn work(&self) -> f64 {
-        1.0
-    }
 }
 
 /// A push of the tool, with the ground truth of what the hand feels and the eye sees.
@@ -275,8 +240,8 @@ struct Pushed {
     surfaces: [Surroundings; 3],
     /// Force of the tool at the end of each, N.
     forces_n: [f64; 2],
-    /// Mean work of a step, as a share of one substep with all tetrahedra awake.
-    work: f64,
+    /// Mean number of substeps of a step.
+    substeps: f64,
     /// Mean time step, ms.
     dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
@@ -300,7 +265,7 @@ impl Push {
         let ends = [0.0, slide.length_mm].map(|mm| on_surface(slide.place + mm * slide.along(normal)));
         let middle = 0.5 * (ends[0] + ends[1]);
         let mesh = refined(&brains.domain, truth, middle, normal)?;
-        let solver = &mut brains.tled_with_pressure(&mesh, true)?;
+        let solver = &mut brains.tled(&mesh, true, 1.0)?;
         let truth = run(slide, normal, ends, &mesh, solver, LONGEST_MS[0])?;
         Ok(Self { slide: *slide, normal, ends, truth })
     }
@@ -316,7 +281,7 @@ impl Push {
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
         let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
-        self.found(&mesh, &mut brains.tled_with_pressure(&mesh, averaged_pressure)?, LONGEST_MS[0])
+        self.found(&mesh, &mut brains.tled(&mesh, averaged_pressure, SQUEEZED_MASS)?, LONGEST_MS[0])
     }
 
     /// Measures every choice, in the order of `brains`.
@@ -337,10 +302,10 @@ impl Push {
         brains.choices.iter().map(one).collect()
     }
 
-    fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Result<Measurement, SessionError> {
+    fn found(&self, mesh: &TetMesh, solver: &mut dyn SoftSolver, longest_ms: f32) -> Result<Measurement, SessionError> {
         let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
-        let Pushed { work, dt_ms, ns, .. } = found;
-        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), work, dt_ms, ns })
+        let Pushed { substeps, dt_ms, ns, .. } = found;
+        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), substeps, dt_ms, ns })
     }
 
     /// Distance of this ground truth from a finer one, 95th percentile over the places, mm.
@@ -392,14 +357,14 @@ fn run(
     normal: Vec3,
     ends: [Vec3; 2],
     mesh: &TetMesh,
-    solver: &mut dyn Solver,
+    solver: &mut dyn SoftSolver,
     longest_ms: f32,
 ) -> Result<Pushed, SessionError> {
     let rest = Surroundings::of(mesh, ends[0])?;
     let ball = Ball { slide, normal, ends };
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
     let (mut surfaces, mut forces_n) = (vec![rest], [0.0; 2]);
-    let (mut work, mut steps, mut step_ms) = (0.0, 0u32, 0.0);
+    let (mut substeps, mut steps, mut step_ms) = (0, 0u32, 0.0);
     let stops = [TIMES_MS[0] + TIMES_MS[1], TIMES_MS.iter().sum()];
     let (mut now, mut next) = (0.0f32, 0.0f32);
     for (stop, force_n) in stops.into_iter().zip(&mut forces_n) {
@@ -409,20 +374,25 @@ fn run(
                 next += TURN_MS;
             }
             let clock = Clock::start();
-            let dt_ms = solver.seam().next_dt_ms().min(longest_ms);
-            let substeps = solver.seam().step(&loads, dt_ms).substeps;
+            let dt_ms = solver.next_dt_ms().min(longest_ms);
+            substeps += solver.step(&loads, dt_ms).substeps;
             step_ms += clock.now_ms();
-            work += f64::from(substeps.max(1)) * solver.work();
             (steps, now) = (steps + 1, now + dt_ms);
         }
-        let positions = solver.seam().positions();
+        let positions = solver.positions();
         let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
         *force_n = loads.contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum();
         surfaces.push(surfaces[0].moved(positions)?);
     }
     let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
     let surfaces = surfaces.try_into().unwrap_or_else(|_| unreachable!("at rest and at two ends"));
-    Ok(Pushed { surfaces, forces_n, work: work / f64::from(steps), dt_ms: f64::from(now) / f64::from(steps), ns })
+    Ok(Pushed {
+        surfaces,
+        forces_n,
+        substeps: f64::from(substeps) / f64::from(steps),
+        dt_ms: f64::from(now) / f64::from(steps),
+        ns,
+    })
 }
 
 /// The tip of the tool on its way: down at one end of the slide, then straight to the other.

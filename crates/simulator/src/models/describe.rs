@@ -46,8 +46,6 @@ pub struct TissueSummary {
     pub tets: usize,
     /// Halvings of the edge length around the opening.
     pub halvings: u32,
-    /// Motion in 50 ms below which tissue sleeps, mm; 0 = nothing sleeps.
-    pub still_mm: f64,
     /// Reason for the choice.
     pub why: String,
 }
@@ -179,7 +177,6 @@ impl Models {
                 solver: tissue.solver,
                 tets: tissue.tets,
                 halvings: tissue.halvings,
-                still_mm: tissue.still_mm,
                 why: why.tissue,
             },
             picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: why.picture },

@@ -202,7 +202,6 @@ impl ModelRequest {
         let spacing_mm = spacing_mm.and_then(|mm| near(mm, &mut rows.bone.iter().map(|row| row.what.spacing_mm)));
         rows.bone.retain(|row| spacing_mm.is_none_or(|mm| row.what.spacing_mm == mm));
         rows.tissue.retain(|row| solver.is_none_or(|name| row.what.solver == name));
-        rows.tissue.retain(|row| row.what.still_mm == 0.0 || !ingredients.steps_all());
         let tets = tets.and_then(|n| near(n as f64, &mut rows.tissue.iter().map(|row| row.what.tets as f64)));
         rows.tissue.retain(|row| tets.is_none_or(|n| row.what.tets as f64 == n));
         let finest = rows.tissue.iter().map(|row| row.what.halvings).max();
@@ -292,7 +291,6 @@ impl Models {
             rigid: Some(bone.method),
             rigid_points: Some(bone.points),
             solver: Some(tissue.solver),
-            still_mm: Some(tissue.still_mm),
             threads: self.ingredients.threads.or(self.plan.as_ref().map(|plan| plan.solver_threads as usize)),
             ..self.ingredients.clone()
         }
@@ -452,7 +450,7 @@ mod tests {
         };
         let plain = settle("--quality usual", None).ingredients();
         assert_eq!(
-            Ingredients { solver: None, still_mm: None, rigid: None, rigid_points: None, ..plain.clone() },
+            Ingredients { solver: None, rigid: None, rigid_points: None, ..plain.clone() },
             Ingredients::default()
         );
         let line = "--quality usual --set element=locking-free,threads=2,law.grey=ogden,shaft=on --set friction=0.1";
@@ -478,12 +476,13 @@ mod tests {
 
     #[test]
     fn what_relaxes_or_runs_on_the_card_never_sleeps() {
+        let settle = |line: &str| request(line, None).settle(&FACTS, || false, unmeasured).unwrap();
+        let config = |line: &str| settle(line).ingredients().config().still_mm;
         for key in ["relaxation=prony", "device=gpu"] {
             let line = format!("--quality usual --set still-mm=0.01 --set {key}");
-            assert_eq!(request(&line, None).settle(&FACTS, || false, unmeasured).unwrap().setup.tissue.still_mm, 0.0);
+            assert_eq!(config(&line), 0.0, "{key}");
         }
-        let line = "--quality usual --set still-mm=0.01";
-        assert_eq!(request(line, None).settle(&FACTS, || false, unmeasured).unwrap().setup.tissue.still_mm, 0.01);
+        assert_eq!(config("--quality usual --set still-mm=0.01"), 0.01);
     }
 
     #[test]

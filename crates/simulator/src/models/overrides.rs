@@ -108,13 +108,10 @@ impl Overrides {
 
     /// Replaces the given values of tissue.
     pub fn tissue(&self, tissue: Tissue) -> Tissue {
-        let Ingredients { solver, still_mm, .. } = self.ingredients;
-        let still_mm = still_mm.unwrap_or(tissue.still_mm);
         Tissue {
-            solver: solver.unwrap_or(tissue.solver),
+            solver: self.ingredients.solver.unwrap_or(tissue.solver),
             tets: self.tets.unwrap_or(tissue.tets),
             halvings: self.halvings.unwrap_or(tissue.halvings),
-            still_mm: if self.ingredients.steps_all() { 0.0 } else { still_mm },
         }
     }
 }

@@ -69,12 +69,12 @@ pub(crate) fn html(
 
 /// Describes the models that ran, and why they were chosen.
 fn parts(ModelSummary { bone, tissue, picture, .. }: &ModelSummary) -> [serde_json::Value; 3] {
-    let TissueSummary { solver, tets, halvings, still_mm, .. } = *tissue;
+    let TissueSummary { solver, tets, halvings, .. } = *tissue;
     let rays = if picture.sparse { "sparse rays" } else { "every ray" };
     let part = |name: &str, what: String, why: &str| json!({ "name": name, "what": what, "why": why });
     [
         part("Bone", format!("{} on {} mm voxels", bone.method, bone.spacing_mm), &bone.why),
-        part("Tissue", Tissue { solver, tets, halvings, still_mm }.to_string(), &tissue.why),
+        part("Tissue", Tissue { solver, tets, halvings }.to_string(), &tissue.why),
         part("Picture", format!("{rays}, detail {}", picture.detail), &picture.why),
     ]
 }

@@ -33,7 +33,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     let mut random = scope.random(super::SEED + 9100);
     for &source in scope.pick(&[Source::BuiltIn][..], &[Source::BuiltIn, Source::MadeUp]) {
         let case = Case::of(source, &mut random);
-        let unit = Tissue { solver: "tled", tets: TETS[0], halvings: 0, still_mm: 0.0 };
+        let unit = Tissue { solver: "tled", tets: TETS[0], halvings: 0 };
         let brains = Brains::of(&case.brain, &[unit], Element::Plain).expect("the brain can be filled");
         for n in 0..scope.pick(1, 4) {
             let (situation, _) = super::stretch(&case, &mut random);
