@@ -106,7 +106,7 @@ impl Ingredients {
     pub(crate) fn config(&self) -> Config {
         Config {
             mass_scaling: MASS_ADDED,
-            squeezed_mass: self.squeezed_mass,
+            dynamic_mass_scaling: self.dynamic_mass_scaling,
             averaged_pressure: self.element == Element::LockingFree,
             relaxation: match self.relaxation {
                 Relaxation::Off => trepan_tled::Relaxation::NONE,

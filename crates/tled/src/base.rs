@@ -2,9 +2,9 @@
 
 use crate::bound::Bound;
 use crate::config::{Config, Damping};
+use crate::dynamic_scaling::DynamicScaling;
 use crate::layout::Layout;
 use crate::scaling::Scaling;
-use crate::squeeze::Squeeze;
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, BodyError, NodeState, Stiffness, lowest_frequency_of};
 
@@ -70,13 +70,13 @@ impl Base {
         self.config.safety * self.bound.elements_ms()
     }
 
-    /// Which elements get mass while they are squeezed: those that the step at rest does not bear.
-    pub fn squeeze(&self) -> Squeeze {
-        let most = self.config.squeezed_mass;
+    /// Which elements get mass: those that have stiffened more than the step at rest bears.
+    pub fn dynamic_scaling(&self) -> DynamicScaling {
+        let most = self.config.dynamic_mass_scaling;
         let stiffest = self.bound.stiffest;
         // Of the growth with which `longest_ms` is still the stable step at rest.
         let limit = ((SUBSTEP_SAFETY / self.config.safety).powi(2) - 1.0) / GROWTH_AHEAD * stiffest;
-        if most > 1.0 && limit > 0.0 { Squeeze { limit, stiffest, most } } else { Squeeze::NONE }
+        if most > 1.0 && limit > 0.0 { DynamicScaling { limit, stiffest, most } } else { DynamicScaling::NONE }
     }
 
     /// Recommended length of the next step, ms, where an element's ω² grew by `growth` in the last

@@ -14,12 +14,12 @@
 //! block belongs to. Forces are added lane by lane for every register width, so that every kernel
 //! sums in the same order.
 
+use crate::dynamic_scaling::DynamicScaling;
 use crate::element::{deformation, deformation_of, forces};
 use crate::lane::{Lane, NODES, Quad, WIDTH};
 use crate::law::{Constitutive, Deformation, Stress};
 use crate::pass::{Pass, PassReport};
 use crate::relaxation::Fade;
-use crate::squeeze::Squeeze;
 use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
 use trepan_soft::{Material, Shape, element_omega2};
@@ -62,8 +62,8 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     pub sums: &'a mut [Quad; NODES],
     /// A quarter of each element's mass, g, by block.
     pub quarter_mass: &'a [[f32; WIDTH]],
-    pub squeeze: Squeeze,
-    /// Mass for nodes of squeezed elements: node of the part, and g.
+    pub dynamic: DynamicScaling,
+    /// Mass for nodes of stiffened elements: node of the part, and g.
     pub added: &'a mut Vec<(u32, f32)>,
     pub law: PhantomData<M>,
 }
@@ -189,9 +189,9 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let gained = stiffness(&stress, moduli, &d, volume_change)
                     - stiffness_at_rest(M::stress_at_rest(&constants), moduli);
                 let mut grown = L::load(&block.omega2, part) * gained;
-                if (L::splat(self.squeeze.limit) - grown).not_positive() > 0 {
+                if (L::splat(self.dynamic.limit) - grown).not_positive() > 0 {
                     grown =
-                        self.squeeze.weigh(grown, part, (block.corners::<L>(part), &self.quarter_mass[i]), self.added);
+                        self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.quarter_mass[i]), self.added);
                 }
                 growth = grown.larger(growth);
                 if T > 0 {

@@ -27,10 +27,10 @@ pub struct Config {
     /// does not change. Infinite = all elements get the same stable step; only for
     /// [`settle`](crate::Tled::settle), where only the equilibrium matters.
     pub mass_scaling: f32,
-    /// Largest factor on an element's mass while it is stiffer than at rest, so that a few squeezed
-    /// elements do not shorten the step of the whole body; weight does not change. 1 = no factor.
+    /// Largest factor on an element's mass while it is stiffer than at rest; 1 = none. A few such
+    /// elements do not shorten the step of the whole body then; weight does not change.
     /// The simulators use 16. On the graphics card the step is shortened instead.
-    pub squeezed_mass: f32,
+    pub dynamic_mass_scaling: f32,
     /// Speed limit of a node, mm/ms (m/s). A surgeon's hand stays under 1. Faster nodes are clamped
     /// and counted.
     pub max_speed: f32,
@@ -63,7 +63,7 @@ impl Default for Config {
             substeps: 4,
             balanced_gravity: Vec3::ZERO,
             mass_scaling: 0.0,
-            squeezed_mass: 1.0,
+            dynamic_mass_scaling: 1.0,
             max_speed: 10.0,
             max_displacement: 2.0,
             averaged_pressure: false,
@@ -105,8 +105,8 @@ impl Config {
         let gravity = self.balanced_gravity;
         check(gravity.is_finite(), "balanced_gravity", gravity.length(), "finite, 9.81e-3 mm/ms² on Earth")?;
         check(self.mass_scaling >= 0.0, "mass_scaling", self.mass_scaling, "at least 0; 0.01 is not felt")?;
-        let squeezed = self.squeezed_mass;
-        check(squeezed >= 1.0 && squeezed.is_finite(), "squeezed_mass", squeezed, "at least 1 and finite")?;
+        let dynamic = self.dynamic_mass_scaling;
+        check(dynamic >= 1.0 && dynamic.is_finite(), "dynamic_mass_scaling", dynamic, "at least 1 and finite")?;
         positive("max_speed", self.max_speed)?;
         positive("max_displacement", self.max_displacement)?;
         let still_mm = self.still_mm;

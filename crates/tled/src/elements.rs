@@ -1,6 +1,7 @@
 //! The elements and nodes of a body, and their passes.
 
 use crate::config::Config;
+use crate::dynamic_scaling::DynamicScaling;
 use crate::force_slots::ForceSlots;
 use crate::lane::{NODES, WIDTH};
 use crate::layout::{Layout, kind};
@@ -10,7 +11,6 @@ use crate::part::{Forcing, Part, PartGroups, Quiet};
 use crate::pass::PassReport;
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
-use crate::squeeze::Squeeze;
 use crate::team::{Team, Work};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
@@ -25,7 +25,7 @@ pub(crate) struct Elements {
     team: Team,
     averaged_pressure: bool,
     relaxation: Relaxation,
-    squeeze: Squeeze,
+    dynamic: DynamicScaling,
     still_mm: f32,
 }
 
@@ -33,7 +33,7 @@ impl Elements {
     pub fn of(
         body: &Body,
         layout: &Layout,
-        (scaling, squeeze): (&Scaling, Squeeze),
+        (scaling, dynamic): (&Scaling, DynamicScaling),
         nodes: Nodes,
         config: &Config,
     ) -> Self {
@@ -54,7 +54,7 @@ impl Elements {
             team: Team::of(parts, nodes, force_slots, config.kernel.resolved(), config.threads),
             averaged_pressure: config.averaged_pressure,
             relaxation: config.relaxation,
-            squeeze,
+            dynamic,
             still_mm: config.still_mm,
         }
     }
@@ -75,16 +75,16 @@ impl Elements {
 
     /// Computes every element's forces from the nodes' displacements, `dt_ms` after the last step.
     pub fn forces(&mut self, dt_ms: f32) -> PassReport {
-        let Self { averaged_pressure, squeeze, .. } = *self;
+        let Self { averaged_pressure, dynamic, .. } = *self;
         let (fade, quiet) = (self.relaxation.fade(dt_ms), self.quiet(dt_ms));
-        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, squeeze, quiet }));
+        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, dynamic, quiet }));
         self.team.report()
     }
 
-    /// Adds the mass for squeezed elements to their nodes for the rest of a step, or takes it away
+    /// Adds the mass for stiffened elements to their nodes for the rest of a step, or takes it away
     /// again.
     pub fn weigh(&self, adds: bool) {
-        if self.squeeze != Squeeze::NONE {
+        if self.dynamic != DynamicScaling::NONE {
             self.team.weigh(adds);
         }
     }
@@ -164,9 +164,9 @@ mod tests {
             (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
             let config = Config { kernel, averaged_pressure: averaged, relaxation, threads, ..Config::default() };
             let scaling = Scaling::of(body, 0.0);
-            let squeeze =
-                Squeeze { limit: 0.1 * scaling.stiffest as f32, stiffest: scaling.stiffest as f32, most: 4.0 };
-            let mut elements = Elements::of(body, &layout, (&scaling, squeeze), nodes, &config);
+            let dynamic =
+                DynamicScaling { limit: 0.1 * scaling.stiffest as f32, stiffest: scaling.stiffest as f32, most: 4.0 };
+            let mut elements = Elements::of(body, &layout, (&scaling, dynamic), nodes, &config);
             let mut compute = || {
                 elements.volumes(0.7);
                 elements.forces(0.7)

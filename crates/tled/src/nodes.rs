@@ -30,7 +30,7 @@ pub(crate) struct Nodes {
     pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
-    /// Mass that squeezed elements add in this step, g; 0 everywhere while `is_heavier` is false.
+    /// Mass that stiffened elements add in this step, g; 0 everywhere while `is_heavier` is false.
     added: Scalars,
     is_heavier: AtomicBool,
     /// Share of the mass that has weight (scaled mass has none).
@@ -178,12 +178,12 @@ impl Nodes {
         carried + (update.gravity * self.weight[place] + force * inverse_mass) * (self.lightness(place) * gain)
     }
 
-    /// 1/m with the mass that squeezed elements add, 1/g.
+    /// 1/m with the mass that stiffened elements add, 1/g.
     pub fn present_inverse_mass(&self, place: usize) -> f32 {
         self.inverse_mass[place] * self.lightness(place)
     }
 
-    /// A node's mass without over that with what squeezed elements add; 1 for a fixed node.
+    /// A node's mass without over that with what stiffened elements add; 1 for a fixed node.
     #[inline(always)]
     fn lightness(&self, place: usize) -> f32 {
         1.0 / (1.0 + self.added.get(place) * self.inverse_mass[place])

@@ -21,6 +21,7 @@
 
 use crate::block::{Block, Forces, Memory, Strain, Volumes};
 use crate::config::Config;
+use crate::dynamic_scaling::DynamicScaling;
 use crate::force_slots::ForceSlots;
 use crate::kernel::Kernel;
 use crate::lane::{NODES, Quad, WIDTH};
@@ -29,7 +30,6 @@ use crate::nodes::Nodes;
 use crate::pass::PassReport;
 use crate::relaxation::Fade;
 use crate::scaling::Scaling;
-use crate::squeeze::Squeeze;
 use glam::Vec4;
 use std::marker::PhantomData;
 use trepan_soft::{Body, Law};
@@ -43,7 +43,7 @@ pub(crate) struct Part {
     /// A quarter of the volume change of the elements around each node, mm³; then the mean `J - 1`
     /// of its node group.
     volumes: Box<[f32; NODES]>,
-    /// Mass for nodes of squeezed elements in the last force pass: node of the part, and g.
+    /// Mass for nodes of stiffened elements in the last force pass: node of the part, and g.
     added: Vec<(u32, f32)>,
     /// Report of the last force pass.
     pub report: PassReport,
@@ -65,7 +65,7 @@ pub(crate) const CALM: f32 = 0.1;
 pub(crate) struct Forcing {
     pub fade: [Fade; 2],
     pub averaged_pressure: bool,
-    pub squeeze: Squeeze,
+    pub dynamic: DynamicScaling,
     pub quiet: Quiet,
 }
 
@@ -178,7 +178,7 @@ impl Part {
         self.groups.slots.iter().zip(&*self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
     }
 
-    /// Mass for nodes of elements that were squeezed in the last force pass: place, and g.
+    /// Mass for nodes of elements that had stiffened in the last force pass: place, and g.
     pub fn added(&self) -> impl Iterator<Item = (usize, f32)> {
         self.added.iter().map(|&(node, grams)| (self.groups.places[node as usize] as usize, grams))
     }
@@ -268,7 +268,7 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
     fn forces(
         &mut self,
         kernel: Kernel,
-        &Forcing { fade, squeeze, .. }: &Forcing,
+        &Forcing { fade, dynamic, .. }: &Forcing,
         (u, averages): (&[Quad; NODES], &[f32; NODES]),
         (sums, added): (&mut [Quad; NODES], &mut Vec<(u32, f32)>),
     ) -> PassReport {
@@ -282,7 +282,7 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
             averages,
             sums,
             quarter_mass,
-            squeeze,
+            dynamic,
             added,
             law: *law,
         })

@@ -146,7 +146,7 @@ impl Team {
         self.shared.parts.iter().fold(PassReport::default(), add)
     }
 
-    /// Adds the mass for squeezed elements to their nodes, or takes it away again.
+    /// Adds the mass for stiffened elements to their nodes, or takes it away again.
     pub fn weigh(&self, adds: bool) {
         let nodes = self.nodes();
         for part in &self.shared.parts {

@@ -117,7 +117,7 @@ impl Tled {
         Ok(Self {
             gravity: Vec3::ZERO,
             growth: 0.0,
-            elements: Elements::of(body, &base.layout, (&scaling, base.squeeze()), nodes, config),
+            elements: Elements::of(body, &base.layout, (&scaling, base.dynamic_scaling()), nodes, config),
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             mass_added: scaling.added as f32,

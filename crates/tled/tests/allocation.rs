@@ -50,8 +50,8 @@ fn a_step_never_allocates() {
         if !held {
             body.fixed.clear();
         }
-        // Some elements are squeezed beyond what twice their mass makes up for.
-        let config = Config { threads, squeezed_mass: 2.0, ..Config::default() };
+        // Some elements stiffen beyond what twice their mass makes up for.
+        let config = Config { threads, dynamic_mass_scaling: 2.0, ..Config::default() };
         let mut tled = Tled::new(&body, &config).unwrap();
         let dt = tled.stable_dt_ms() * 2.5;
         tled.step(&loads, dt);

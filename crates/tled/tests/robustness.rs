@@ -55,7 +55,7 @@ fn press_by(depth_mm: f32) -> Loads {
 #[test]
 fn runs_repeat_bit_for_bit_whatever_the_kernel_and_the_number_of_threads() {
     let end = |kernel, threads| {
-        let mut tled = shaken(&Config { kernel, threads, squeezed_mass: 64.0, ..Config::default() }, 1.0);
+        let mut tled = shaken(&Config { kernel, threads, dynamic_mass_scaling: 64.0, ..Config::default() }, 1.0);
         let dt = tled.stable_dt_ms();
         (0..500).for_each(|_| _ = tled.step(&press(0.3, 0.1), dt));
         tled.positions().iter().flat_map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>()
@@ -161,13 +161,14 @@ fn a_hard_hit_at_the_full_step_is_survived_by_substeps() {
     assert!(tled.velocities().iter().all(|v| v.length() < 1e-4));
 }
 
-/// Under a probe, steps of [`SoftSolver::next_dt_ms`] do the same in fewer substeps than those of
-/// the step at rest, which are cut in two there; with mass for squeezed elements they are as long
-/// as at rest.
+/// Under a probe, steps of [`SoftSolver::next_dt_ms`] do the same in fewer substeps.
+///
+/// Those of the step at rest are cut in two there. With dynamic mass scaling they are as long as at
+/// rest.
 #[test]
 fn the_step_of_the_deformed_body_saves_substeps() {
-    let pressed = |next: bool, squeezed_mass: f32| {
-        let mut tled = shaken(&Config { squeezed_mass, ..Config::default() }, 0.0);
+    let pressed = |next: bool, dynamic_mass_scaling: f32| {
+        let mut tled = shaken(&Config { dynamic_mass_scaling, ..Config::default() }, 0.0);
         let (rest_ms, mut now_ms, mut substeps, mut force) = (tled.stable_dt_ms(), 0.0, 0, 0.0);
         assert_eq!(tled.next_dt_ms(), rest_ms);
         while now_ms < 600.0 {

@@ -157,13 +157,13 @@ pub const KEYS: &[Key] = &[
         ..Key::of(Part::Tled)
     },
     Key {
-        name: "squeezed-mass",
+        name: "dynamic-mass-scaling",
         values: || "1 to 64".into(),
-        about: "largest factor on the mass of an element that is squeezed, which keeps the step long; 1: none",
+        about: "largest factor on the mass of an element that has stiffened, which keeps the step long; 1: none",
         usual: Some("16"),
         compared: || vec!["1".into()],
-        get: |i| Some(i.squeezed_mass.to_string()),
-        set: |i, text| number(text, 64.0).filter(|most| *most >= 1.0).map(|most| i.squeezed_mass = most as f32),
+        get: |i| Some(i.dynamic_mass_scaling.to_string()),
+        set: |i, text| number(text, 64.0).filter(|most| *most >= 1.0).map(|most| i.dynamic_mass_scaling = most as f32),
         ..Key::of(Part::Tled)
     },
     Key {
@@ -534,7 +534,7 @@ mod tests {
             "vibration=off",
             "solver=tled",
             "still-mm=0.01",
-            "squeezed-mass=4",
+            "dynamic-mass-scaling=4",
             "element=locking-free",
             "law=ogden",
             "law.grey=mooney-rivlin",

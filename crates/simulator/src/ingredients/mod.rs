@@ -37,8 +37,8 @@ pub struct Ingredients {
     pub solver: Option<&'static str>,
     /// Motion in 50 ms below which tissue sleeps, mm; 0 = nothing sleeps.
     pub still_mm: f32,
-    /// Largest factor on the mass of a squeezed element, without unit; 1 = none.
-    pub squeezed_mass: f32,
+    /// Largest factor on the mass of a stiffened element, without unit; 1 = none.
+    pub dynamic_mass_scaling: f32,
     /// Tetrahedral element.
     pub element: Element,
     /// Constitutive law of each tissue class, in the order of [`TissueClass::ALL`].
@@ -59,8 +59,8 @@ pub struct Ingredients {
     pub folds: bool,
 }
 
-/// Usual [`Ingredients::squeezed_mass`].
-pub(crate) const SQUEEZED_MASS: f32 = 16.0;
+/// Usual [`Ingredients::dynamic_mass_scaling`].
+pub(crate) const DYNAMIC_MASS_SCALING: f32 = 16.0;
 
 /// Tetrahedral elements of the solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -101,7 +101,7 @@ impl Default for Ingredients {
             vibration: true,
             solver: None,
             still_mm: 0.0,
-            squeezed_mass: SQUEEZED_MASS,
+            dynamic_mass_scaling: DYNAMIC_MASS_SCALING,
             element: Element::Plain,
             laws: [Law::NeoHookean; TissueClass::ALL.len()],
             relaxation: Relaxation::Off,

@@ -19,7 +19,7 @@
 
 use super::bone::Slide;
 use crate::error::SessionError;
-use crate::ingredients::{Element, SQUEEZED_MASS};
+use crate::ingredients::{DYNAMIC_MASS_SCALING, Element};
 use crate::run::clock::Clock;
 use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::TriMesh;
@@ -79,8 +79,8 @@ impl Fineness {
     }
 }
 
-/// Radius on the surface and depth of the refined region in a session's mesh, mm: a burr hole of
-/// 5 mm and a probe of 2 mm. Further away a probe strains too little to need small elements.
+/// Radius on the surface and depth of the refined region in a session's mesh, mm. A burr hole has
+/// 5 mm and a probe 2; further away it strains too little to need small elements.
 const OPENING_MM: [f32; 2] = [7.0, 4.0];
 /// The same in a ground truth.
 const TRUTH_MM: [f32; 2] = [8.0, 5.0];
@@ -199,15 +199,15 @@ impl<'a> Brains<'a> {
     fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn SoftSolver>, SessionError> {
         match Method::named(choice.solver) {
             Some(method) => method.build(&self.body(mesh)).map_err(brain_error),
-            None => Ok(Box::new(self.tled(mesh, self.element == Element::LockingFree, SQUEEZED_MASS)?)),
+            None => Ok(Box::new(self.tled(mesh, self.element == Element::LockingFree, DYNAMIC_MASS_SCALING)?)),
         }
     }
 
     /// Creates TLED with the settings of a session; with or without averaged nodal pressure.
-    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, squeezed_mass: f32) -> Result<Tled, SessionError> {
+    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, dynamic_mass_scaling: f32) -> Result<Tled, SessionError> {
         let damping = self.damping;
         let config =
-            Config { mass_scaling: MASS_ADDED, squeezed_mass, damping, averaged_pressure, ..Config::default() };
+            Config { mass_scaling: MASS_ADDED, dynamic_mass_scaling, damping, averaged_pressure, ..Config::default() };
         Tled::new(&self.body(mesh), &config).map_err(brain_error)
     }
 
@@ -281,7 +281,7 @@ impl Push {
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
         let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
-        self.found(&mesh, &mut brains.tled(&mesh, averaged_pressure, SQUEEZED_MASS)?, LONGEST_MS[0])
+        self.found(&mesh, &mut brains.tled(&mesh, averaged_pressure, DYNAMIC_MASS_SCALING)?, LONGEST_MS[0])
     }
 
     /// Measures every choice, in the order of `brains`.

@@ -14,8 +14,8 @@ pub struct Candidate {
 /// The finest run: voxels and tetrahedra that nothing is held against.
 pub fn truth(scope: Scope) -> Candidate {
     let flags = scope.pick(
-        "--quality fine --spacing-mm 0.5 --tets 25000 --opening-refinement 4 --set squeezed-mass=1",
-        "--quality fine --spacing-mm 0.4 --tets 50000 --opening-refinement 4 --set squeezed-mass=1",
+        "--quality fine --spacing-mm 0.5 --tets 25000 --opening-refinement 4 --set dynamic-mass-scaling=1",
+        "--quality fine --spacing-mm 0.4 --tets 50000 --opening-refinement 4 --set dynamic-mass-scaling=1",
     );
     Candidate { name: "truth", flags }
 }

@@ -1,26 +1,25 @@
-//! Mass for squeezed elements, so that a few of them do not shorten the step of the whole body.
+//! Dynamic mass scaling: mass for elements that stiffen, so that a few do not shorten the step.
 //!
 //! # Theory
 //! An element whose ω² has grown by g since rest would need a step shorter by `√(1 + g/ω₀²)`, ω₀
 //! the largest frequency at rest. Its mass times `(ω₀² + g)/(ω₀² + limit)` lowers its present ω² to
-//! what the step bears: mass scaling as the body deforms (Olovsson, Simonsson and Unosson 2005). A
-//! body's ω² is at most that of its elements alone (Irons and Treharne 1971), so the step holds for
-//! all of it. Weight, damping rate and equilibrium do not change; nodes of squeezed elements move
-//! more slowly.
+//! what the step bears. A body's ω² is at most that of its elements alone (Irons and Treharne
+//! 1971), so the step holds for all of it. Weight, damping rate and equilibrium do not change;
+//! nodes of stiffened elements move more slowly.
 //!
 //! # Practice
-//! Under a probe 5 mm deep, 12 thousand tetrahedra have some hundred squeezed ones, of a few
+//! Under a probe 5 mm deep some hundred of 12 thousand tetrahedra are stiffened, of a few
 //! milligrams each. Finding them costs a comparison for each register of elements.
 //!
 //! # Sources
-//! L. Olovsson, K. Simonsson, M. Unosson: Selective mass scaling for explicit finite element
-//! analyses, International Journal for Numerical Methods in Engineering 63, 2005.
+//! T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures, 2000,
+//! chapter 6 (mass scaling; stable step by elements).
 
 use crate::lane::{Lane, WIDTH};
 
-/// Which elements count as squeezed, and how much mass they may get.
+/// Which elements count as stiffened, and how much mass they may get.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Squeeze {
+pub(crate) struct DynamicScaling {
     /// Growth of an element's ω² that the step bears, 1/ms².
     pub limit: f32,
     /// Largest ω² of an element at rest, 1/ms².
@@ -29,11 +28,11 @@ pub(crate) struct Squeeze {
     pub most: f32,
 }
 
-impl Squeeze {
+impl DynamicScaling {
     /// No element gets mass.
     pub const NONE: Self = Self { limit: f32::INFINITY, stiffest: 1.0, most: 1.0 };
 
-    /// Lists the mass for the nodes of squeezed elements in some lanes, from the growth of their
+    /// Lists the mass for the nodes of stiffened elements in some lanes, from the growth of their
     /// ω²; returns the growth that is left.
     #[cold]
     #[inline(never)]
@@ -64,15 +63,17 @@ impl Squeeze {
 mod tests {
     use super::*;
 
-    /// By hand: ω² of 4 + 8 with a limit of 4 + 2 needs twice the mass; 4 + 92 may have only three
-    /// times and is left with 32.
+    /// Computed by hand.
+    ///
+    /// ω² of 4 + 8 with a limit of 4 + 2 needs twice the mass; 4 + 92 may have three times and is
+    /// left with 32.
     #[test]
-    fn a_squeezed_element_gets_the_mass_for_its_growth() {
-        let squeeze = Squeeze { limit: 2.0, stiffest: 4.0, most: 3.0 };
+    fn a_stiffened_element_gets_the_mass_for_its_growth() {
+        let dynamic = DynamicScaling { limit: 2.0, stiffest: 4.0, most: 3.0 };
         let corners: [[u32; 1]; 4] = [[1], [2], [3], [4]];
         let weigh = |grown: f32| {
             let mut added = Vec::with_capacity(4);
-            let left = squeeze.weigh(grown, 0, (corners.each_ref().map(|c| &c[..]), &[0.5; WIDTH]), &mut added);
+            let left = dynamic.weigh(grown, 0, (corners.each_ref().map(|c| &c[..]), &[0.5; WIDTH]), &mut added);
             (left, added)
         };
         assert_eq!(weigh(8.0), (2.0, vec![(1, 0.5), (2, 0.5), (3, 0.5), (4, 0.5)]));
