@@ -1,4 +1,4 @@
-//! Picks method, voxel size, mesh size, solver, region of interest and picture quality for a
+//! Picks method, voxel size, mesh size, solver and picture quality for a
 //! scene's tolerance and a machine's time.
 //!
 //! # Theory
