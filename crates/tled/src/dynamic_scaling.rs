@@ -8,8 +8,7 @@
 //! nodes of stiffened elements move more slowly.
 //!
 //! # Practice
-//! Under a probe 5 mm deep some hundred of 12 thousand tetrahedra are stiffened, of a few
-//! milligrams each. Finding them costs a comparison for each register of elements.
+//! Finding them costs a comparison for each register of elements.
 //!
 //! # Sources
 //! T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures, 2000,
