@@ -16,7 +16,7 @@ use trepan_trials::engine::report::Report;
 use trepan_trials::engine::store::{self, Store};
 use trepan_trials::engine::suite::{Gate, shown};
 use trepan_trials::engine::timer::Control;
-use trepan_trials::engine::{borders, compare, page};
+use trepan_trials::engine::{borders, compare, limits, page};
 use trepan_trials::suites::families;
 use trepan_trials::suites::{ALL, ON_REQUEST};
 
@@ -281,7 +281,8 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, reported: &BTreeSet<Stri
             progress.durations.insert(key, stored.seconds);
         } else {
             let (before, began) = (Control::now(), Instant::now());
-            let (findings, ended) = part.run(scope);
+            let (mut findings, ended) = part.run(scope);
+            limits::mark(suite.name, scope, &mut findings.gates);
             let seconds = began.elapsed().as_secs_f64();
             let broken = findings.gates.iter().filter(|gate| gate.breaks()).count();
             let word = if broken == 0 { String::new() } else { format!(", {broken} acceptance limit(s) BROKEN") };
@@ -358,6 +359,10 @@ fn paged(out: &Path) -> Result<bool> {
     let page = out.join("index.html");
     whole(&page, page::html(&reports, &families::measured(&reports))?.as_bytes())?;
     println!("page: {}", page.display());
+    for (suite, report) in &reports {
+        let gaps = limits::known_gaps(suite.name, report.making.scope(), &report.findings.gates);
+        gaps.iter().for_each(|gap| println!("  KNOWN GAP {gap}"));
+    }
     let holes = families::holes(&reports);
     holes.iter().for_each(|hole| println!("  HOLE {hole}"));
     Ok(holes.is_empty())

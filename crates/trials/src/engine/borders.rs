@@ -29,18 +29,22 @@ fn place(suite: &str, scope: Scope) -> PathBuf {
     folder.join(format!("{suite}.txt"))
 }
 
-/// Adds a gate on the number of cells worse than the kept boundary and lists them. Does nothing if
-/// no boundary is kept.
+/// Adds limits on the number of cells worse than the kept boundary, which it lists, and on maps
+/// without a kept boundary. Does nothing for a suite without maps.
 pub fn judge(suite: &str, scope: Scope, findings: &mut Findings) {
-    if let Ok(text) = std::fs::read_to_string(place(suite, scope)) {
-        let worse = regressions(&text, &findings.maps);
-        findings.gates.push(Gate::at_most(
-            "cells of maps that are worse than the kept border",
-            worse.len() as f64,
-            0.0,
-        ));
-        findings.regressions = worse;
+    if findings.maps.is_empty() {
+        return;
     }
+    let text = std::fs::read_to_string(place(suite, scope)).unwrap_or_default();
+    let worse = regressions(&text, &findings.maps);
+    findings.gates.push(Gate::at_most("cells of maps that are worse than the kept border", worse.len() as f64, 0.0));
+    findings.regressions.extend(worse);
+    let kept = cells(&text);
+    let has_border = |map: &Map| kept.keys().any(|(title, ..)| *title == line(&map.title));
+    let bare: Vec<&Map> = findings.maps.iter().filter(|map| !has_border(map)).collect();
+    findings.gates.push(Gate::at_most("maps without a kept border", bare.len() as f64, 0.0));
+    let said = bare.iter().map(|map| format!("NO BORDER kept: {} (validate --keep-borders keeps it)", map.title));
+    findings.regressions.extend(said.collect::<Vec<_>>());
 }
 
 /// Writes a suite's boundary file into the sources.

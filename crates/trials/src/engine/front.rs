@@ -1,9 +1,10 @@
 //! Pareto front: the rows that no other row beats in both cost and error.
 
+use crate::engine::picture::Chart;
 use crate::engine::row::Row;
 
-/// Number of rows of a scene that beat a method's row in both metrics. Rows with a missing or
-/// non-finite metric are ignored.
+/// Number of rows of a scene that beat a method's row in both metrics, in cost by more than the
+/// spread of two runs. Rows with a missing or non-finite metric are ignored.
 pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &str) -> usize {
     let value = |row: &Row, name: &str| row.metrics.get(name).copied().filter(|v| v.is_finite());
     let pair = |row: &Row| Some((value(row, cost)?, value(row, error)?));
@@ -12,7 +13,7 @@ pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &st
     in_scene()
         .filter(|row| row.method != method)
         .filter_map(pair)
-        .filter(|other| other.0 < own.0 && other.1 < own.1)
+        .filter(|other| other.0 < own.0 * (1.0 - Chart::SPREAD) && other.1 < own.1)
         .count()
 }
 

@@ -5,6 +5,7 @@ pub mod compare;
 mod figure;
 pub mod files;
 pub mod front;
+pub mod limits;
 pub mod memory;
 pub mod page;
 pub mod part;

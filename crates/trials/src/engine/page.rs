@@ -2,6 +2,7 @@
 //! self-contained page.
 
 use crate::engine::figure::Figure;
+use crate::engine::limits::{self, KnownGap};
 use crate::engine::part::Suite;
 use crate::engine::picture::{Chart, Mark, Outcome};
 use crate::engine::plot;
@@ -38,6 +39,8 @@ struct Drawn {
 /// The whole page as HTML. `methods`: the lines of the table of all methods.
 pub fn html(reports: &[(&Suite, Report)], methods: &impl Serialize) -> Result<String, minijinja::Error> {
     let sections: Vec<Section> = reports.iter().map(|(suite, report)| Section::of(suite, report)).collect();
+    let of = |report: &Report| limits::known_gaps(&report.suite, report.making.scope(), &report.findings.gates);
+    let gaps: Vec<KnownGap> = reports.iter().flat_map(|(_, report)| of(report)).collect();
     let mut pages = Environment::new();
     pages.add_filter("number", shown);
     pages.add_template("page.html", include_str!("../../templates/page.html"))?;
@@ -46,6 +49,7 @@ pub fn html(reports: &[(&Suite, Report)], methods: &impl Serialize) -> Result<St
         style => include_str!("../../templates/page.css"),
         script => include_str!("../../templates/page.js"),
         methods => Value::from(Serde(methods)),
+        gaps => Value::from(Serde(gaps)),
         suites => Value::from(Serde(sections)),
     })
 }
@@ -127,7 +131,7 @@ mod tests {
             gates: vec![
                 Gate::at_most("depth", 0.3, 0.2),
                 Gate::at_most("cost", f64::NAN, 1.0),
-                Gate::at_most("change", 3.0, 1.0).or_known_gap(),
+                Gate { known_gap: true, ..Gate::at_most("change", 3.0, 1.0) },
             ],
             maps: vec![Map {
                 title: "a map".into(),

@@ -1,8 +1,8 @@
 //! Report of one suite: its parts with commit and machine, and their joint findings.
 
-use crate::engine::borders;
 use crate::engine::part::{Part, Scope, Suite};
 use crate::engine::suite::{Findings, Gate};
+use crate::engine::{borders, limits};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -59,6 +59,7 @@ impl Report {
         parts.into_iter().for_each(|(_, _, found)| findings.append(found));
         (suite.judge)(making.scope(), &mut findings);
         borders::judge(suite.name, making.scope(), &mut findings);
+        limits::judge(suite.name, making.scope(), &mut findings);
         let quick = if making.quick { " --quick" } else { "" };
         let seed = if making.seed == 1 { String::new() } else { format!(" --seed {}", making.seed) };
         let command = format!("cargo xtask validate {}{quick}{seed}", suite.name);

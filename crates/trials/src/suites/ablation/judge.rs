@@ -10,11 +10,6 @@ use crate::suites::scripted::worst;
 /// Change of a force and of the shown surface that rounding may make, N and mm.
 const ROUNDING_N: f64 = 1e-3;
 const ROUNDING_MM: f64 = 1e-3;
-/// Runs that are known to leave the skull closed: methods for comparison, which no preset takes.
-const NOT_OPENED: &[&str] = &["rigid=thesis-printed", "rigid=pointshell-average", "rigid=centre-line"];
-/// Runs that are known not to stay finite. These solvers serve comparisons, no preset takes them,
-/// and the probe strains the brain more than they bear.
-const NOT_FINITE: &[&str] = &["solver=linear", "solver=mass-spring"];
 /// A change under this part of its tolerance is not drawn.
 const DRAWN: f64 = 0.01;
 
@@ -48,19 +43,14 @@ fn is_left_out(row: &Row) -> bool {
     row.config.get(LEFT_OUT).and_then(|left_out| left_out.as_bool()).unwrap_or_default()
 }
 
-/// What a run must keep. That an ingredient changes more than the tolerance is a known gap of the
+/// Limits of a run. An ingredient that changes more than the tolerance is a known gap of the
 /// default, which does not have it.
 fn limits(row: &Row) -> Vec<Gate> {
     let name = &row.method;
     let at_most = |what: &str, value: f64, limit: f64| Gate::at_most(format!("{name}: {what}"), value, limit);
-    let at_least = |what: &str, metric: &str, known: &[&str]| {
-        let gate = Gate::at_least(format!("{name}: {what}"), number(row, metric), 1.0);
-        if known.contains(&name.as_str()) { gate.or_known_gap() } else { gate }
-    };
-    let mut limits = vec![
-        at_least("the skull is opened", "opened", NOT_OPENED),
-        at_least("every force and node is finite", "finite", NOT_FINITE),
-    ];
+    let at_least = |what: &str, metric: &str| Gate::at_least(format!("{name}: {what}"), number(row, metric), 1.0);
+    let mut limits =
+        vec![at_least("the skull is opened", "opened"), at_least("every force and node is finite", "finite")];
     match effect(row) {
         "cost" => {
             limits.push(at_most("ticks and looks that differ by a bit", number(row, "ticks_and_looks_unequal"), 0.0))
@@ -75,8 +65,7 @@ fn limits(row: &Row) -> Vec<Gate> {
             ));
         }
         _ if is_left_out(row) => {}
-        _ => limits
-            .push(at_most("worst change over its tolerance", number(row, "change_over_tolerance"), 1.0).or_known_gap()),
+        _ => limits.push(at_most("worst change over its tolerance", number(row, "change_over_tolerance"), 1.0)),
     }
     limits
 }

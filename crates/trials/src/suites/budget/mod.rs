@@ -96,5 +96,5 @@ fn truth(scope: Scope, findings: &mut Findings) {
         }
     }
     let name = "truth on bone: apart from a ball in closed form, of which a scanner has made voxels, p95 mm";
-    findings.gates.push(Gate::at_most(name, worst, 0.15));
+    findings.gates.push(Gate::at_most(name, worst, 0.03));
 }

@@ -1,12 +1,13 @@
 //! Masks that no brain looks like: does the mesher fill them soundly, lose volume, or say no?
 
+use super::PROVEN_DEG;
 use super::scenes::voxels;
 use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::conditions;
 use trepan_geometry::Vec3;
-use trepan_mesh::Surface;
 use trepan_mesh::lattice::{self, Config, Fine};
+use trepan_mesh::{Quality, Surface};
 use trepan_volume::VoxelVolume;
 
 /// Volume that may be lost, as a share, before a mesh is only usable.
@@ -56,6 +57,21 @@ pub fn run(findings: &mut Findings) {
     let map = findings.maps.last().expect("it was just drawn");
     let failed = map.named_cells().filter(|(.., cell)| cell.grade() == 2).count();
     findings.gates.push(Gate::at_most("odd masks: meshes that are not sound", failed as f64, 0.0));
+    for (way, config) in ways {
+        let meshes = CONDITIONS.iter().filter_map(|(_, mask)| lattice::labelled(&mask(), &config).ok());
+        let angles = meshes.map(|labelled| Quality::of(&labelled.mesh));
+        let (least, most) = angles.fold((f64::INFINITY, 0.0f64), |(least, most), quality| {
+            (least.min(quality.min_dihedral_deg), most.max(quality.max_dihedral_deg))
+        });
+        let [proven_least, proven_most] = PROVEN_DEG[usize::from(config.fine.is_some())];
+        findings
+            .rows
+            .push(Row::new("odd masks", way).metric("min_dihedral_deg", least).metric("max_dihedral_deg", most));
+        findings.gates.extend([
+            Gate::at_least(format!("odd masks, {way}: smallest dihedral angle, degrees"), least, proven_least),
+            Gate::at_most(format!("odd masks, {way}: largest dihedral angle, degrees"), most, proven_most),
+        ]);
+    }
 }
 
 fn verdict(labels: &VoxelVolume<u16>, config: &Config) -> Outcome {

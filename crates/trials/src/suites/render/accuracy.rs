@@ -75,9 +75,9 @@ pub fn depth(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
         findings.gates.extend([
             Gate::at_most(format!("{name}: depth of hit against steps of 1/16 voxel, p99 voxel"), p99, 0.1),
             Gate::at_most(
-                format!("{name}: rays that hit on one side only, of {}", leapt.len()),
-                lost as f64,
-                0.001 * leapt.len() as f64,
+                format!("{name}: rays that hit on one side only, percent"),
+                100.0 * lost as f64 / leapt.len() as f64,
+                0.1,
             ),
             Gate::at_most(format!("{name}: hits gained or lost by leaping"), gone as f64, 0.0),
             Gate::at_most(format!("{name}: largest change of a hit by leaping, voxel"), most, 1e-3),

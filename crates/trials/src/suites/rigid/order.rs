@@ -377,10 +377,6 @@ fn steady_mm() -> f64 {
     low.into()
 }
 
-/// Orders that are known to be missed: scene and error. In a bore nothing falls: nodes are at most
-/// 0.5 mm apart.
-const GAPS: [(&str, &str); 2] = [("order: bore", "force"), ("order: bore", "depth")];
-
 /// The orders that the recommended method reaches.
 pub fn judge(findings: &mut Findings) {
     let own = findings.rows.iter().filter(|row| row.method == Method::RECOMMENDED.name());
@@ -390,14 +386,12 @@ pub fn judge(findings: &mut Findings) {
         for (what, metric) in [("force", "force_error_n_order"), ("depth", "depth_error_mm_order")] {
             let least = if in_bore { BORE_ORDER } else { SMOOTH_ORDER };
             let name = format!("{}: order of the error of {what}", row.scene);
-            let gate = Gate::at_least(name, row.metrics[metric], least);
-            let known = GAPS.contains(&(row.scene.as_str(), what));
-            findings.gates.push(if known { gate.or_known_gap() } else { gate });
+            findings.gates.push(Gate::at_least(name, row.metrics[metric], least));
         }
         if in_bore {
             let name = "order: bore: error of depth on the finest voxels, mm";
             let finest = row.metrics["depth_error_mm_at_the_finest"];
-            findings.gates.push(Gate::at_most(name, finest, BORE_MM).or_known_gap());
+            findings.gates.push(Gate::at_most(name, finest, BORE_MM));
         }
     }
 }

@@ -83,9 +83,7 @@ fn kernels(scope: Scope, findings: &mut Findings) {
         }
     }
     let both = best_of("+cure+Prony").unwrap_or(f64::NAN) / plain;
-    // 1.27 to 1.75 by how the memory of one process happens to lie; 2.06 was seen beside another
-    // process.
-    findings.gates.push(Gate::at_most(format!("{scene}: cure and Prony over the plain step"), both, 2.5));
+    findings.gates.push(Gate::at_most(format!("{scene}: cure and Prony over the plain step"), both, 1.6));
 }
 
 fn row(scene: &str, run: &Run) -> Row {

@@ -164,7 +164,7 @@ const MEASURED: &str = "measured_us";
 const PREDICTED: &str = "predicted_us";
 
 /// Gates over all scenes of a run; wider in a quick run, which has few scenes and rounds.
-pub fn judge(scope: Scope, findings: &mut Findings) {
+pub fn judge(_: Scope, findings: &mut Findings) {
     let ours = |metric: &str| {
         let rows = findings.rows.iter().filter(|row| row.method == OURS);
         rows.filter_map(|row| row.metrics.get(metric).copied()).collect::<Vec<f64>>()
@@ -189,13 +189,9 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
     let slowest = calibration.iter().copied().fold(0.0, f64::max);
     let calibration_ms = quantile(&mut calibration, 0.5);
     findings.gates.extend([
-        Gate::at_most(format!("{OURS}: median regret over {scenes} scenes, percent"), middle, scope.pick(15.0, 3.0)),
-        Gate::at_most(format!("{OURS}: worst regret over {scenes} scenes, percent"), worst, scope.pick(40.0, 10.0)),
-        Gate::at_least(
-            "predicted against measured time, R squared over all",
-            r_squared(times.iter()),
-            scope.pick(0.8, 0.95),
-        ),
+        Gate::at_most(format!("{OURS}: median regret over {scenes} scenes, percent"), middle, 3.0),
+        Gate::at_most(format!("{OURS}: worst regret over {scenes} scenes, percent"), worst, 10.0),
+        Gate::at_least("predicted against measured time, R squared over all", r_squared(times.iter()), 0.95),
     ]);
     findings.rows.push(
         Row::new("all scenes", OURS)
