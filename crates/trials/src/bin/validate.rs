@@ -16,7 +16,7 @@ use trepan_trials::engine::report::Report;
 use trepan_trials::engine::store::{self, Store};
 use trepan_trials::engine::suite::{Gate, shown};
 use trepan_trials::engine::timer::Control;
-use trepan_trials::engine::{borders, compare, limits, page};
+use trepan_trials::engine::{borders, compare, limits, page, repeat};
 use trepan_trials::suites::families;
 use trepan_trials::suites::{ALL, ON_REQUEST};
 
@@ -50,6 +50,10 @@ struct Run {
     /// each other [default: 2 with --quick, else 1]
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u8).range(1..))]
     jobs: Option<u8>,
+    /// Run every part N times: times become medians with 95 % intervals, limits are judged on
+    /// medians
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    repeat: u16,
     /// Store the stability boundaries of this run's maps in the sources, as the reference for later
     /// runs
     #[arg(long, conflicts_with = "shard")]
@@ -141,7 +145,7 @@ fn run(asked: &Run) -> Result<bool> {
         }
     };
     let reported = if at_once > 1 { beside(at_once, asked, &jobs, &store)? } else { BTreeSet::new() };
-    let kept = perform(jobs, &store, scope, &reported)?;
+    let kept = perform(jobs, &store, scope, asked.repeat, &reported)?;
     if asked.shard.is_some() || whole_suites.is_empty() {
         println!("parts: {}", asked.out.join("parts").display());
         return Ok(kept);
@@ -233,6 +237,7 @@ fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BT
         let mut shard = Command::new(&program);
         shard.args(&asked.suites).args(asked.quick.then_some("--quick")).arg("--out").arg(&asked.out);
         shard.args(["--seed", &asked.seed.to_string(), "--shard", &format!("{}/{at_once}", number + 1)]);
+        shard.args(["--repeat", &asked.repeat.to_string()]);
         shard.stdout(Stdio::piped()).spawn().context("cannot start a process for a shard")
     };
     let mut shards = (0..at_once).map(start).collect::<Result<Vec<Child>>>()?;
@@ -266,7 +271,7 @@ fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BT
 
 /// Runs the parts that are not stored yet; returns whether every acceptance limit of every part is
 /// met. Parts in `reported` are not printed again.
-fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, reported: &BTreeSet<String>) -> Result<bool> {
+fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, repeats: u16, reported: &BTreeSet<String>) -> Result<bool> {
     let mut progress = Progress::of(&jobs, store, 1)?;
     let mut passed = true;
     for Job { suite, part, key } in jobs {
@@ -281,7 +286,15 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, reported: &BTreeSet<Stri
             progress.durations.insert(key, stored.seconds);
         } else {
             let (before, began) = (Control::now(), Instant::now());
-            let (mut findings, ended) = part.run(scope);
+            let (first, mut ended) = part.run(scope);
+            let mut all = vec![first];
+            for again in (1..repeats).filter_map(|_| (suite.parts)(scope).into_iter().find(|part| part.slug() == slug))
+            {
+                let (findings, whole) = again.run(scope);
+                ended &= whole;
+                all.push(findings);
+            }
+            let mut findings = repeat::combine(all);
             limits::mark(suite.name, scope, &mut findings.gates);
             let seconds = began.elapsed().as_secs_f64();
             let broken = findings.gates.iter().filter(|gate| gate.breaks()).count();

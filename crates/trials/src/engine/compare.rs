@@ -93,6 +93,11 @@ fn kind(metric: &str) -> (Nature, Better) {
     }
 }
 
+/// Whether a metric is a time, or a ratio of times, so that it varies from run to run.
+pub(crate) fn is_timed(metric: &str) -> bool {
+    kind(metric).0 != Nature::Exact
+}
+
 /// Change of one metric of one method over all scenes of both runs.
 #[derive(Debug)]
 struct Change {

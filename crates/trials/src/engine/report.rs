@@ -90,14 +90,37 @@ fn machine() -> BTreeMap<String, String> {
     let cpu =
         cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')).map(|(_, name)| name.trim());
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    [
+    let known = [
         ("cpu", cpu.unwrap_or("unknown").to_string()),
         ("cores", cores.to_string()),
+        ("caches", caches()),
+        ("frequency", said(&format!("{CPU}/cpufreq/scaling_governor")).unwrap_or("not said by the system".into())),
+        ("memory", said("/proc/meminfo").map_or("unknown".into(), |text| text.lines().next().map_or("", total).into())),
         ("system", format!("{} {}", std::env::consts::OS, std::env::consts::ARCH)),
         ("profile", if cfg!(debug_assertions) { "dev" } else { "release" }.to_string()),
-    ]
-    .map(|(name, value)| (name.to_string(), value))
-    .into()
+    ];
+    known.map(|(name, value)| (name.to_string(), value)).into()
+}
+
+/// Folder in which Linux describes the first core.
+const CPU: &str = "/sys/devices/system/cpu/cpu0";
+
+fn said(file: &str) -> Option<String> {
+    std::fs::read_to_string(file).ok().map(|text| text.trim().to_string())
+}
+
+fn total(line: &str) -> &str {
+    line.split_once(':').map_or(line, |(_, size)| size.trim())
+}
+
+/// Levels and sizes of the first core's caches.
+fn caches() -> String {
+    let of = |index: usize| {
+        let word = |what: &str| said(&format!("{CPU}/cache/index{index}/{what}"));
+        Some(format!("L{} {} {}", word("level")?, word("type")?.to_lowercase(), word("size")?))
+    };
+    let all: Vec<String> = (0..8).map_while(of).collect();
+    if all.is_empty() { "not said by the system".into() } else { all.join(", ") }
 }
 
 #[cfg(test)]

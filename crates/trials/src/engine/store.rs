@@ -11,6 +11,7 @@
 
 use crate::engine::files::whole;
 use crate::engine::part::{Scope, Suite};
+use crate::engine::picture::Table;
 use crate::engine::report::{Making, Report, slugs};
 use crate::engine::suite::{Findings, Row};
 use crate::engine::timer::{Control, Samples};
@@ -178,10 +179,29 @@ fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -
         bail!("{}: {} part(s) are missing, such as {}: run their shard first", suite.name, missing.len(), missing[0]);
     }
     let controls: Vec<Control> = parts.values().map(|(_, part)| part.control).collect();
+    let beside = beside(wanted.iter().filter_map(|name| Some((name, &parts.get(name)?.1))));
     let take = |name: &String| parts.remove(name).map(|(_, part)| (name.clone(), part.making, part.findings));
     let mut report = Report::of(suite, wanted.iter().filter_map(take).collect());
-    report.iter_mut().for_each(|report| report.findings.rows.push(control(&controls)));
+    if let Some(report) = &mut report {
+        report.findings.rows.push(control(&controls));
+        report.findings.tables.push(beside.clone());
+    }
     Ok(report)
+}
+
+/// Table of the control beside each part: how long the part took, and how busy the machine was.
+fn beside<'a>(parts: impl Iterator<Item = (&'a String, &'a Stored)>) -> Table {
+    let row = |(name, part): (&String, &Stored)| {
+        let Control { empty_p99_us, sum_p50_us, sum_p99_us, load } = part.control;
+        let numbers = [part.seconds, load, empty_p99_us, sum_p50_us, sum_p99_us];
+        std::iter::once(name.clone()).chain(numbers.map(|number| format!("{number:.2}"))).collect()
+    };
+    let columns = ["part", "took, s", "load", "empty call p99, us", "fixed sum p50, us", "fixed sum p99, us"];
+    Table {
+        title: "Machine beside every part".into(),
+        columns: columns.map(String::from).into(),
+        rows: parts.map(row).collect(),
+    }
 }
 
 /// Row of the timing control: medians over the parts, and the worst.

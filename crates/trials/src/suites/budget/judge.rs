@@ -11,6 +11,7 @@ use super::super::Scope;
 use crate::engine::picture::{Chart, Mark};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::engine::timer::Samples;
+use crate::engine::worst::{self, Rank};
 use std::collections::BTreeMap;
 
 const KINDS: [&str; 3] = ["bone", "tissue", "picture"];
@@ -39,7 +40,7 @@ impl Did {
 type Scene = BTreeMap<(String, String), Did>;
 
 /// Summary rows, gates and the chart.
-pub fn judge(_: Scope, findings: &mut Findings) {
+pub fn judge(scope: Scope, findings: &mut Findings) {
     let scenes = scenes(&findings.rows);
     if scenes.is_empty() {
         return;
@@ -51,6 +52,15 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     let row = summary(&scenes, &KINDS, "all scenes", findings);
     findings.rows.extend(row);
     gates(&scenes, findings);
+    // Tolerances that some choice meets.
+    let is_possible = |row: &&Row| {
+        let kind = row.config.get("kind").and_then(|kind| kind.as_str()).unwrap_or_default();
+        let name = row.scene.strip_suffix(&format!(", {kind}")).unwrap_or_default();
+        scenes.get(&format!("{}, {name}", row.part)).is_some_and(|scene| did(scene, kind, "cheapest").is_some())
+    };
+    let own: Vec<&Row> = findings.rows.iter().filter(|row| row.method == "auto").filter(is_possible).collect();
+    let worst = worst::table("budget", scope, &own, &[Rank { metric: "error_over_tolerance", low_is_bad: false }]);
+    findings.tables.push(worst);
 }
 
 /// What the rows say, by part and scene.

@@ -19,6 +19,7 @@ mod ride;
 
 use super::{Part, Scope};
 use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::worst::{self, Rank};
 use crate::population::{BaseHead, Files, Head, HeadRecipe, base_heads};
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -248,7 +249,7 @@ fn row_of_ride(head: &str, place: &str, quality: &str, session: Result<Session>,
 }
 
 /// What must hold for every head, place and quality.
-pub fn judge(_: Scope, findings: &mut Findings) {
+pub fn judge(scope: Scope, findings: &mut Findings) {
     let number = |row: &Row, name: &str| row.metrics.get(name).copied().unwrap_or(f64::NAN);
     let rides: Vec<&Row> = findings.rows.iter().filter(|row| row.metrics.contains_key("opened")).collect();
     let all = |name: &str, wrong: &dyn Fn(f64) -> bool| rides.iter().filter(|row| wrong(number(row, name))).count();
@@ -279,7 +280,12 @@ pub fn judge(_: Scope, findings: &mut Findings) {
             imports().filter(|row| number(row, "dice") < DICE && !doubts(row)).count(),
         ),
     ];
+    let rank = |metric, low_is_bad| Rank { metric, low_is_bad };
+    let high = ["jump_mm", "rest_motion_mm", "skipped_ms"].map(|metric| rank(metric, false));
+    let mut tables = vec![worst::table("population", scope, &rides, &high)];
+    tables.push(worst::table("population", scope, &imports().collect::<Vec<_>>(), &[rank("dice", true)]));
     findings.gates.extend(gates.map(|(name, count)| Gate::at_most(name, count as f64, 0.0)));
+    findings.tables.extend(tables);
 }
 
 /// Whether the import said that the brain it found may be wrong.
