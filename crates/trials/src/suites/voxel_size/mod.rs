@@ -9,9 +9,9 @@
 //! in `meshes-collision` (`stanford-bunny.obj`, `spot.obj`, ...).
 
 mod odd;
-mod pass;
-mod scene;
-mod timing;
+pub(super) mod pass;
+pub(super) mod scene;
+pub(super) mod timing;
 
 use super::{Part, Scope};
 use crate::engine::suite::{Findings, Gate, Row};
@@ -23,7 +23,7 @@ use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
 
 /// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean
 /// edge; errors of the last two.
-const TABLE: [[f64; 8]; 5] = [
+pub const TABLE: [[f64; 8]; 5] = [
     [41_937.0, 20.0, 28.33, 39.0, 28.73, 41.90, 0.038, 1.272],
     [52_326.0, 22.0, 28.16, 38.0, 30.94, 45.16, 0.283, 1.727],
     [60_688.0, 16.0, 34.04, 54.0, 32.49, 47.40, 0.086, 0.669],
@@ -31,7 +31,7 @@ const TABLE: [[f64; 8]; 5] = [
     [80_927.0, 20.0, 37.87, 57.0, 35.65, 51.90, 0.124, 0.734],
 ];
 /// Triangle models: bunny, cow, armadillo.
-const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
+pub const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
 /// The rules in the rows, this crate's first.
 pub const RULES: [&str; 6] =
     [OURS, "expected work alone", "thesis analytic", "thesis, measured prices", "mean edge", "1.45 x mean edge"];
