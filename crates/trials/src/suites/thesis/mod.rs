@@ -14,6 +14,8 @@
 //! without a folder of models (`TREPAN_DATA`): the built-in brain stands in.
 
 mod comparison;
+mod deformable;
+mod grid;
 mod items;
 mod judgement;
 mod rigid;
@@ -23,6 +25,9 @@ pub use judgement::judge;
 use super::{Part, Scope};
 
 /// Lists the parts, in the order of the thesis.
-pub fn parts(_: Scope) -> Vec<Part> {
-    rigid::parts()
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let mut parts = rigid::parts();
+    parts.extend(deformable::parts());
+    parts.extend(grid::parts(scope));
+    parts
 }

@@ -121,7 +121,7 @@ fn ride_once(method: &Method, bone: &BoneVolume, path: &[ToolState]) -> Ride {
 }
 
 /// Largest value.
-fn most(values: &[f64]) -> f64 {
+pub fn most(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NAN, f64::max)
 }
 
