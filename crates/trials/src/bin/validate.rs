@@ -348,7 +348,8 @@ fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
     Ok(report.passed())
 }
 
-/// Writes the page of every report in the folder; returns whether every method of every family is
+/// Writes the page of every report in the folder, and one more of each report that has lines over
+/// frames; returns whether every method of every family is
 /// in it.
 fn paged(out: &Path) -> Result<bool> {
     let mut reports = Vec::new();
@@ -358,6 +359,12 @@ fn paged(out: &Path) -> Result<bool> {
     let page = out.join("index.html");
     whole(&page, page::html(&reports, &families::measured(&reports))?.as_bytes())?;
     println!("page: {}", page.display());
+    for (suite, report) in reports.iter().filter(|(_, report)| !report.findings.series.is_empty()) {
+        let page = out.join(format!("{}.html", suite.name));
+        let alone = [(*suite, report.clone())];
+        whole(&page, page::html(&alone, &[(); 0])?.as_bytes())?;
+        println!("page of {}: {}", suite.name, page.display());
+    }
     let holes = families::holes(&reports);
     holes.iter().for_each(|hole| println!("  HOLE {hole}"));
     Ok(holes.is_empty())

@@ -143,12 +143,17 @@ impl Series {
     }
 }
 
+/// Five significant digits, so that files stay small.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.4e}").parse().unwrap_or(value)
+}
+
 /// Points of a line over frames; each range of frames keeps its least and its largest value.
 fn thinned<V: Into<f64> + Copy>(values: &[V]) -> Vec<(f64, f64)> {
     let range = values.len().div_ceil(RANGES).max(1);
     let mut points = Vec::new();
     for (number, range_of) in values.chunks(range).enumerate() {
-        let at = |(n, value): (usize, &V)| ((number * range + n) as f64, (*value).into());
+        let at = |(n, value): (usize, &V)| ((number * range + n) as f64, rounded((*value).into()));
         let finite = || range_of.iter().enumerate().map(at).filter(|(_, value): &(f64, f64)| value.is_finite());
         let least = finite().min_by(|a, b| a.1.total_cmp(&b.1));
         let most = finite().max_by(|a, b| a.1.total_cmp(&b.1));

@@ -67,6 +67,17 @@ impl Verdict {
     }
 }
 
+/// What measured times are compared with.
+const THESIS_HERE: &str = "the thesis's method in this run";
+
+/// Ratio of a verdict, with its words.
+pub struct Ratio {
+    /// Over 1 is worse; NaN where there is nothing to compare with.
+    pub value: f64,
+    /// The ratio in words; empty where there is none.
+    pub text: String,
+}
+
 /// A quantity of a numbered figure or table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
@@ -128,39 +139,41 @@ impl Comparison {
         if self.corrected.is_finite() { self.corrected } else { self.as_printed }
     }
 
+    /// What is judged against what; over 1 is worse, or for `Equal` more.
+    pub fn ratio(&self) -> Ratio {
+        let (judged, printed, thesis_here) = (self.judged(), self.printed, self.thesis_here());
+        let (own, against, value) = match self.rule {
+            Rule::More => (judged, "the printed value", printed / judged),
+            Rule::Time if judged > printed => (judged, "the printed bound", judged / printed),
+            Rule::Time => (self.ours, THESIS_HERE, self.ours / thesis_here),
+            Rule::Less if printed.is_nan() => (self.ours, THESIS_HERE, self.ours / thesis_here),
+            Rule::Less | Rule::Equal(_) => (judged, "the printed value", judged / printed),
+        };
+        let quotient = if self.rule == Rule::More { 1.0 / value } else { value };
+        let subject = if own == self.ours { "ours" } else { "the thesis's method here" };
+        let text = if value.is_finite() { format!("{subject} is {quotient:.2} of {against}") } else { String::new() };
+        Ratio { value, text }
+    }
+
     /// The verdict.
     pub fn verdict(&self) -> Verdict {
-        let (judged, printed) = (self.judged(), self.printed);
+        let (judged, ratio) = (self.judged(), self.ratio().value);
         match self.rule {
-            Rule::Equal(within) => match (judged / printed - 1.0).abs() <= within || judged == printed {
+            Rule::Equal(within) => match (ratio - 1.0).abs() <= within {
                 true => Verdict::Same,
                 false => Verdict::CannotCompare,
             },
-            Rule::More => Verdict::of_ratio(printed / judged),
-            Rule::Time if judged > printed => Verdict::Worse,
-            Rule::Time if self.ours.is_nan() && judged.is_finite() => Verdict::Same,
-            Rule::Time => Verdict::of_ratio(self.ours / self.thesis_here()),
-            Rule::Less if printed.is_nan() => Verdict::of_ratio(self.ours / self.thesis_here()),
-            Rule::Less => Verdict::of_ratio(judged / printed),
+            Rule::Time if judged > self.printed => Verdict::Worse,
+            Rule::Time if ratio.is_nan() && judged.is_finite() => Verdict::Same,
+            _ => Verdict::of_ratio(ratio),
         }
     }
 
     /// The reason of the verdict, with its ratio.
     pub fn reason(&self) -> String {
-        let (against, ratio) = match self.rule {
-            Rule::Time | Rule::Less if self.rule == Rule::Time || self.printed.is_nan() => {
-                ("the thesis's method in this run", self.ours / self.thesis_here())
-            }
-            _ => ("the printed value", self.judged() / self.printed),
-        };
-        let subject = if self.ours.is_finite() { "ours" } else { "the thesis's method here" };
-        let bound = match self.rule {
-            Rule::Time if self.judged() > self.printed => "the printed bound is passed",
-            Rule::Time if self.printed.is_finite() => "the printed bound, of a machine of 2012, holds",
-            _ => "",
-        };
-        let ratio = if ratio.is_finite() { format!("{subject} is {ratio:.2} of {against}") } else { String::new() };
-        let all = [ratio.as_str(), bound, &self.why];
+        let holds = self.rule == Rule::Time && self.judged() <= self.printed;
+        let bound = if holds { "the printed bound, of a machine of 2012, holds" } else { "" };
+        let all = [self.ratio().text, bound.into(), self.why.clone()];
         all.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ")
     }
 
@@ -240,6 +253,8 @@ mod tests {
         assert_eq!(verdict(Rule::Time, 1000.0, 20.0, 10.0), Verdict::Better);
         assert_eq!(verdict(Rule::Time, 5.0, 20.0, 10.0), Verdict::Worse);
         assert_eq!(verdict(Rule::Time, 15.0, 10.0, nan), Verdict::Same);
+        assert_eq!(verdict(Rule::Time, 15.0, nan, 1.0), Verdict::Same);
+        assert_eq!(verdict(Rule::Time, 15.0, nan, nan), Verdict::CannotCompare);
         assert_eq!(verdict(Rule::Equal(0.02), 100.0, nan, 101.0), Verdict::Same);
         assert_eq!(verdict(Rule::Equal(0.02), 100.0, nan, 110.0), Verdict::CannotCompare);
         assert_eq!(verdict(Rule::Equal(0.02), nan, nan, nan), Verdict::CannotCompare);

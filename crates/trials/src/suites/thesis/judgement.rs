@@ -1,6 +1,6 @@
 //! The table of all figures and tables, their count, and the count of verdicts.
 
-use super::comparison::{Comparison, Verdict, cell};
+use super::comparison::{Comparison, Ratio, Verdict, cell};
 use super::items::{ITEMS, Item};
 use crate::engine::picture::Table;
 use crate::engine::suite::{Findings, Gate, Row};
@@ -42,20 +42,17 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     let counts = Verdict::ALL
         .map(|verdict| format!("{} {}", verdict.name(), there().filter(|of| of.verdict() == verdict).count()));
     conclusions.push(format!("By the worst verdict of each: {}.", counts.join(", ")));
-    let worse = there().flat_map(|of| &of.comparisons).filter(|c| c.verdict() == Verdict::Worse);
-    conclusions.extend(worse.map(|c| {
-        format!(
-            "Worse: {}, {}: printed {}, judged {} {}.",
-            c.item,
-            c.quantity,
-            cell(c.printed),
-            cell(c.judged()),
-            c.unit
-        )
-    }));
+    conclusions.extend(
+        there()
+            .filter_map(Counterpart::worst)
+            .map(|(c, ratio)| format!("Worse: {}, {}: {}.", c.item, c.quantity, ratio.text)),
+    );
     let rows = all.iter().flat_map(Counterpart::lines_of_table).collect();
     let gate = Gate::at_least("numbered figures and tables with a counterpart, percent", percent, LEAST_PERCENT);
     findings.tables.insert(0, table(rows));
+    let place = |title: &str| ITEMS.iter().position(|item| is_of(title, item));
+    findings.series.sort_by_key(|series| place(&series.title));
+    findings.pictures.sort_by_key(|picture| place(&picture.title));
     findings.conclusions.extend(conclusions);
     findings.gates.push(gate);
 }
@@ -106,6 +103,12 @@ impl<'a> Counterpart<'a> {
         let worst = self.comparisons.iter().map(Comparison::verdict).max();
         let pointed = if self.pointers.is_empty() { Verdict::CannotCompare } else { Verdict::Same };
         worst.unwrap_or(pointed)
+    }
+
+    /// The number with the worst ratio among those that are worse.
+    fn worst(&self) -> Option<(&Comparison, Ratio)> {
+        let worse = self.comparisons.iter().filter(|c| c.verdict() == Verdict::Worse);
+        worse.map(|c| (c, c.ratio())).max_by(|a, b| a.1.value.total_cmp(&b.1.value))
     }
 
     fn lines_of_table(&self) -> Vec<Vec<String>> {

@@ -18,6 +18,8 @@ mod deformable;
 mod grid;
 mod items;
 mod judgement;
+mod pointers;
+mod prototypes;
 mod rigid;
 
 pub use judgement::judge;
@@ -29,5 +31,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     let mut parts = rigid::parts();
     parts.extend(deformable::parts());
     parts.extend(grid::parts(scope));
+    parts.extend(prototypes::parts());
+    parts.extend(pointers::parts());
     parts
 }
