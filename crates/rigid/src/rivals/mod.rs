@@ -19,4 +19,4 @@ pub mod thesis;
 mod traverse;
 pub mod voxel_sum;
 
-pub use sweep::Sweep;
+pub use sweep::{Ball, Stop, Sweep};

@@ -26,7 +26,7 @@ pub enum Sweep {
 
 /// Where a sweep ended.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stop {
+pub struct Stop {
     /// Centre of the tool, world mm.
     pub centre: Vec3,
     /// Whether bone stopped it before its goal.
@@ -34,7 +34,7 @@ pub(crate) struct Stop {
 }
 
 /// What is swept.
-pub(crate) struct Ball<'a> {
+pub struct Ball<'a> {
     /// Radius, mm.
     pub radius_mm: f32,
     /// Points of the surface relative to the centre, world axes, mm.

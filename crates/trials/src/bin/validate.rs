@@ -362,7 +362,8 @@ fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
     Ok(report.passed())
 }
 
-/// Writes the page of every report in the folder; returns whether every method of every family is
+/// Writes the page of every report in the folder, and one more of each report that has lines over
+/// frames; returns whether every method of every family is
 /// in it.
 fn paged(out: &Path) -> Result<bool> {
     let mut reports = Vec::new();
@@ -375,6 +376,12 @@ fn paged(out: &Path) -> Result<bool> {
     for (suite, report) in &reports {
         let gaps = limits::known_gaps(suite.name, report.making.scope(), &report.findings.gates);
         gaps.iter().for_each(|gap| println!("  KNOWN GAP {gap}"));
+    }
+    for (suite, report) in reports.iter().filter(|(_, report)| !report.findings.series.is_empty()) {
+        let page = out.join(format!("{}.html", suite.name));
+        let alone = [(*suite, report.clone())];
+        whole(&page, page::html(&alone, &[(); 0])?.as_bytes())?;
+        println!("page of {}: {}", suite.name, page.display());
     }
     let holes = families::holes(&reports);
     holes.iter().for_each(|hole| println!("  HOLE {hole}"));

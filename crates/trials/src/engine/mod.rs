@@ -2,6 +2,7 @@
 
 pub mod borders;
 pub mod compare;
+pub mod curve;
 mod figure;
 pub mod files;
 pub mod front;

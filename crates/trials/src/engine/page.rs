@@ -5,9 +5,9 @@ use crate::engine::figure::Figure;
 use crate::engine::limits::{self, KnownGap};
 use crate::engine::part::Suite;
 use crate::engine::picture::{Chart, Mark, Outcome};
-use crate::engine::plot;
 use crate::engine::report::Report;
 use crate::engine::suite::{Row, shown};
+use crate::engine::{curve, plot};
 use minijinja::value::Serde;
 use minijinja::{Environment, Value, context};
 use serde::Serialize;
@@ -22,6 +22,7 @@ struct Section<'a> {
     /// Command that runs one part alone.
     command_of_part: String,
     charts: Vec<Drawn>,
+    series: Vec<Drawn>,
     maps: Vec<Figure<'a>>,
     /// Number of map cells that work, degrade, fail and are refused.
     grades: [usize; 4],
@@ -34,6 +35,13 @@ struct Section<'a> {
 struct Drawn {
     svg: Option<String>,
     fault: Option<String>,
+}
+
+impl Drawn {
+    fn of(svg: Result<String, Box<dyn std::error::Error>>) -> Self {
+        let svg = svg.map_err(|fault| fault.to_string());
+        Self { fault: svg.as_ref().err().cloned(), svg: svg.ok() }
+    }
 }
 
 /// The whole page as HTML. `methods`: the lines of the table of all methods.
@@ -66,6 +74,7 @@ impl<'a> Section<'a> {
             broken: found.gates.iter().filter(|gate| gate.breaks()).count(),
             command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
             charts: charts(suite, report),
+            series: found.series.iter().map(|series| Drawn::of(curve::svg(series))).collect(),
             maps: found.maps.iter().map(Figure::of).collect(),
             grades,
             tables: found.rows.chunk_by(|a, b| a.metrics.keys().eq(b.metrics.keys())).collect(),
@@ -76,7 +85,8 @@ impl<'a> Section<'a> {
 
 fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
     let own = &report.findings.charts;
-    let drawn = if own.is_empty() { vec![chart_of_all(suite, report)] } else { own.clone() };
+    let needed = own.is_empty() && report.findings.series.is_empty();
+    let drawn = if needed { vec![chart_of_all(suite, report)] } else { own.clone() };
     let mut methods: Vec<&str> = Vec::new();
     for mark in drawn.iter().flat_map(|chart| &chart.marks) {
         if !methods.contains(&mark.method.as_str()) {
@@ -84,11 +94,10 @@ fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
         }
     }
     let draw = |chart: &Chart| {
-        let svg = match chart.marks.is_empty() {
-            true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
-            false => plot::svg(chart, &methods).map_err(|fault| fault.to_string()),
-        };
-        Drawn { fault: svg.as_ref().err().cloned(), svg: svg.ok() }
+        Drawn::of(match chart.marks.is_empty() {
+            true => Err(format!("no row has {} and {}", chart.cost, chart.error).into()),
+            false => plot::svg(chart, &methods),
+        })
     };
     drawn.iter().map(draw).collect()
 }
@@ -108,7 +117,7 @@ fn chart_of_all(suite: &Suite, report: &Report) -> Chart {
 mod tests {
     use super::*;
     use crate::engine::part::{Scope, nothing_more};
-    use crate::engine::picture::{Map, Table};
+    use crate::engine::picture::{Map, Series, Snapshot, Table};
     use crate::engine::report::Making;
     use crate::engine::suite::{Findings, Gate};
     use std::collections::BTreeMap;
@@ -146,6 +155,8 @@ mod tests {
                 columns: vec!["key".into(), "force, N".into()],
                 rows: vec![vec!["a=1".into(), "0.25".into()]],
             }],
+            series: vec![Series::over_frames("depth <p>", "mm", [("own".to_string(), &[0.5, 0.25][..])])],
+            pictures: vec![Snapshot { title: "seen".into(), png: "AAAA".into() }],
             conclusions: vec!["a=1 changes & costs".into()],
             regressions: vec!["WORSE: a map".into()],
             ..Findings::default()
@@ -175,6 +186,8 @@ mod tests {
             "<td>a=1</td><td>0.25</td>",
             "a=1 changes &amp; costs",
             "<td>known gap</td>",
+            "depth &lt;p&gt;",
+            "<img alt=\"seen\" src=\"data:image/png;base64,AAAA\">",
             "<circle",
         ] {
             assert!(page.contains(part), "{part} is missing in {page}");

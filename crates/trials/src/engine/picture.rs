@@ -98,6 +98,82 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
+/// Lines of a quantity over frames, or over another quantity, for a suite's page.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Series {
+    /// Title.
+    pub title: String,
+    /// Quantity of the horizontal axis with its unit.
+    pub x: String,
+    /// Quantity of the vertical axis with its unit.
+    pub y: String,
+    /// Whether the vertical axis is logarithmic; values that are not positive are left out then.
+    pub logarithmic: bool,
+    /// Lines: name, and points in order.
+    #[serde(serialize_with = "within_a_file")]
+    pub lines: Vec<Line>,
+    /// Limit across the vertical axis with its name.
+    pub limit: Option<(f64, String)>,
+}
+
+/// Most ranges of frames in a thinned line; each keeps its least and its largest value.
+const RANGES: usize = 240;
+
+impl Series {
+    /// Creates a chart of values over frames. Long lines keep the least and the largest value of
+    /// every range of frames, so no peak is lost.
+    pub fn over_frames<'a, V: Into<f64> + Copy + 'a>(
+        title: impl Into<String>,
+        y: &str,
+        lines: impl IntoIterator<Item = (String, &'a [V])>,
+    ) -> Self {
+        let lines = lines.into_iter().map(|(name, values)| (name, thinned(values))).collect();
+        Self { title: title.into(), x: "frame".into(), y: y.into(), lines, ..Self::default() }
+    }
+
+    /// The same on a logarithmic vertical axis with a limit.
+    pub fn limited(self, limit: f64, name: &str) -> Self {
+        Self { logarithmic: true, limit: Some((limit, name.into())), ..self }
+    }
+
+    /// Whether every line has two finite points or more.
+    pub fn is_drawn(&self) -> bool {
+        let finite = |(_, points): &Line| points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).count();
+        !self.lines.is_empty() && self.lines.iter().all(|line| finite(line) > 1)
+    }
+}
+
+/// Five significant digits, so that files stay small.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.4e}").parse().unwrap_or(value)
+}
+
+/// Points of a line over frames; each range of frames keeps its least and its largest value.
+fn thinned<V: Into<f64> + Copy>(values: &[V]) -> Vec<(f64, f64)> {
+    let range = values.len().div_ceil(RANGES).max(1);
+    let mut points = Vec::new();
+    for (number, range_of) in values.chunks(range).enumerate() {
+        let at = |(n, value): (usize, &V)| ((number * range + n) as f64, rounded((*value).into()));
+        let finite = || range_of.iter().enumerate().map(at).filter(|(_, value): &(f64, f64)| value.is_finite());
+        let least = finite().min_by(|a, b| a.1.total_cmp(&b.1));
+        let most = finite().max_by(|a, b| a.1.total_cmp(&b.1));
+        let mut both: Vec<(f64, f64)> = least.into_iter().chain(most).collect();
+        both.sort_by(|a, b| a.0.total_cmp(&b.0));
+        both.dedup();
+        points.extend(both);
+    }
+    points
+}
+
+/// Picture that a run made, for a suite's page.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// Title.
+    pub title: String,
+    /// The PNG file in base 64 (RFC 4648).
+    pub png: String,
+}
+
 /// Result of a method in one cell of a map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -202,6 +278,19 @@ pub fn describe_change(map: &Map, row: &str, column: &str, was: &Outcome, is: &O
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_thinned_line_keeps_its_peaks_in_order() {
+        let mut values = vec![1.0f64; 10_000];
+        (values[4321], values[4322]) = (-7.0, 9.0);
+        let series = Series::over_frames("t", "y", [("a".to_string(), &values[..])]);
+        let points = &series.lines[0].1;
+        assert!(points.len() <= 2 * RANGES && series.is_drawn());
+        assert!(points.contains(&(4321.0, -7.0)) && points.contains(&(4322.0, 9.0)));
+        assert!(points.is_sorted_by(|a, b| a.0 < b.0));
+        let gap = Series::over_frames("t", "y", [("a".to_string(), &[f64::NAN, 1.0][..])]);
+        assert!(!gap.is_drawn() && gap.lines[0].1 == [(1.0, 1.0)]);
+    }
 
     #[test]
     fn a_mark_better_in_both_beats() {

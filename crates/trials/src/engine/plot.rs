@@ -20,7 +20,7 @@ const LETTER: f64 = 6.4;
 /// Distance of a label from its mark, px.
 const BESIDE: i32 = 9;
 /// Colours that are distinguishable with any colour vision (Okabe and Ito 2008).
-const COLOURS: [RGBColor; 7] = [
+pub(super) const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -202,7 +202,7 @@ impl Label {
 }
 
 /// Axis label with three significant digits.
-fn tick(value: &f64) -> String {
+pub(super) fn tick(value: &f64) -> String {
     let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 7.0);
     let text = format!("{value:.*}", digits as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }

@@ -4,7 +4,7 @@
 //! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never depends on an
 //! absolute time: times belong in charts, as ratios within one run.
 
-use crate::engine::picture::{Chart, Map as StabilityMap, Table};
+use crate::engine::picture::{Chart, Map as StabilityMap, Series, Snapshot, Table};
 use crate::engine::row::number;
 pub use crate::engine::row::{Row, shown};
 use serde::{Deserialize, Serialize};
@@ -76,6 +76,12 @@ pub struct Findings {
     /// Tables for the page.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<Table>,
+    /// Lines over frames for the page.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub series: Vec<Series>,
+    /// Pictures for the page.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pictures: Vec<Snapshot>,
     /// Conclusions in words, for the page and the terminal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub conclusions: Vec<String>,
@@ -92,6 +98,8 @@ impl Findings {
         self.charts.append(&mut other.charts);
         self.maps.append(&mut other.maps);
         self.tables.append(&mut other.tables);
+        self.series.append(&mut other.series);
+        self.pictures.append(&mut other.pictures);
         self.conclusions.append(&mut other.conclusions);
         self.regressions.append(&mut other.regressions);
     }

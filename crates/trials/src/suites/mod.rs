@@ -15,6 +15,7 @@ mod render;
 pub mod rigid;
 mod scripted;
 mod simulators;
+mod thesis;
 mod tled;
 mod volume;
 mod voxel_size;
@@ -125,6 +126,13 @@ pub const ALL: &[Suite] = &[
         chart: ("path_mm", "plunge_mm"),
         parts: simulators::parts,
         judge: simulators::judge,
+    },
+    Suite {
+        name: "thesis",
+        question: "which numbered figures and tables of the thesis come out again, the same, better or worse",
+        chart: ("printed", "ours"),
+        parts: thesis::parts,
+        judge: thesis::judge,
     },
     Suite {
         name: "tled",

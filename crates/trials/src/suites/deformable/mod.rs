@@ -2,10 +2,10 @@
 //! are cubes and a brain on the thesis's three paths, jumps and broken meshes.
 
 mod poses;
-mod published;
-mod recording;
+pub(super) mod published;
+pub(super) mod recording;
 mod ride;
-mod scene;
+pub(super) mod scene;
 mod stability;
 mod truth;
 

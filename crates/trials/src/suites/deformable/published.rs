@@ -5,7 +5,7 @@ use crate::engine::suite::Row;
 
 /// Models of Tables 4.1 and 4.2: name, tetrahedra, cell, mm, and whether every step kept within 1
 /// ms (Figures 4.8 and 4.12).
-const MODELS: [(&str, usize, f64, bool); 12] = [
+pub const MODELS: [(&str, usize, f64, bool); 12] = [
     ("Cube1", 1_715, 37.5, true),
     ("Cube2", 10_985, 20.0, true),
     ("Cube3", 53_240, 12.0, true),

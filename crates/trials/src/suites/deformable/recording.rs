@@ -11,7 +11,7 @@ use super::scene::{PATHS, RADIUS_MM, Scene};
 use std::path::{Path, PathBuf};
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_deformable::{Config, TissueCollision, TissueStep};
-use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{self, HandModel, Simulated};
@@ -27,8 +27,19 @@ pub const NAMES: [&str; 3] = ["brain-light", "brain-random", "brain-repeated"];
 
 /// Where the tip was at each tick of a recorded path.
 pub fn tips(name: &str) -> Vec<Vec3> {
+    path(name).iter().map(ToolState::tip).collect()
+}
+
+/// The tool at each tick of a recorded path.
+pub fn path(name: &str) -> Vec<ToolState> {
     let recording = Recording::open(&trepan_fixtures::recorded_path(name)).expect("the fixture is a recording");
-    recording.ticks.iter().map(|tick| tick.device.translation).collect()
+    let state = |tick: &TickRecord| ToolState {
+        world_from_tool: tick.device,
+        twist: tick.twist,
+        buttons: Buttons(tick.buttons),
+        time_ms: tick.time_ms,
+    };
+    recording.ticks.iter().map(state).collect()
 }
 
 /// Records all three paths into a folder.

@@ -7,7 +7,7 @@ mod faults;
 mod likeness;
 mod models;
 pub mod rivals;
-mod scenes;
+pub(super) mod scenes;
 mod speed;
 
 use super::{Part, Scope};

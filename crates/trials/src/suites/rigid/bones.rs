@@ -5,7 +5,7 @@ use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, read, resample, skull_only};
 
 /// Table 3.2: dimensions and voxel edge, mm.
-pub(super) const SKULLS: [([usize; 3], f32); 5] = [
+pub const SKULLS: [([usize; 3], f32); 5] = [
     ([143, 135, 95], 1.5),
     ([171, 162, 114], 1.25),
     ([213, 202, 142], 1.0),

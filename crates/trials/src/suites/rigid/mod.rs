@@ -6,19 +6,19 @@
 //! unless its cost forbids it (the oracle); then its rows are missing.
 
 mod accuracy;
-mod bones;
+pub(super) mod bones;
 mod clearance;
 mod coupling;
 mod energy;
 mod faults;
 mod hands;
-mod models;
+pub(super) mod models;
 mod order;
 mod published;
-mod recording;
+pub(super) mod recording;
 mod removal;
 mod soak;
-mod solid;
+pub(super) mod solid;
 mod walls;
 
 pub use bones::head;

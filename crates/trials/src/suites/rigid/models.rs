@@ -24,7 +24,7 @@ use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{BRICK, BoneVolume, VoxelVolume};
 
 /// Table 3.1: voxels along an edge of 200 mm.
-const CUBES: [usize; 6] = [100, 200, 300, 400, 450, 500];
+pub const CUBES: [usize; 6] = [100, 200, 300, 400, 450, 500];
 /// Edge of the largest grid, voxels.
 const HUGE: usize = 1024;
 /// How much slower the largest grid may be.

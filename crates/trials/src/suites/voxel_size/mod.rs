@@ -9,9 +9,9 @@
 //! in `meshes-collision` (`stanford-bunny.obj`, `spot.obj`, ...).
 
 mod odd;
-mod pass;
-mod scene;
-mod timing;
+pub(super) mod pass;
+pub(super) mod scene;
+pub(super) mod timing;
 
 use super::{Part, Scope};
 use crate::engine::suite::{Findings, Gate, Row};
@@ -23,7 +23,7 @@ use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
 
 /// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean
 /// edge; errors of the last two.
-const TABLE: [[f64; 8]; 5] = [
+pub const TABLE: [[f64; 8]; 5] = [
     [41_937.0, 20.0, 28.33, 39.0, 28.73, 41.90, 0.038, 1.272],
     [52_326.0, 22.0, 28.16, 38.0, 30.94, 45.16, 0.283, 1.727],
     [60_688.0, 16.0, 34.04, 54.0, 32.49, 47.40, 0.086, 0.669],
@@ -31,7 +31,7 @@ const TABLE: [[f64; 8]; 5] = [
     [80_927.0, 20.0, 37.87, 57.0, 35.65, 51.90, 0.124, 0.734],
 ];
 /// Triangle models: bunny, cow, armadillo.
-const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
+pub const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
 /// The rules in the rows, this crate's first.
 pub const RULES: [&str; 6] =
     [OURS, "expected work alone", "thesis analytic", "thesis, measured prices", "mean edge", "1.45 x mean edge"];
@@ -72,18 +72,17 @@ fn bodies(scope: Scope) -> Vec<(Body, Option<usize>)> {
 fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let measures = &scene.measures;
     let usual = measures.traditional_mm();
-    let (steps, first, step) = LADDER;
-    let ladder: Vec<f64> = (0..steps).map(|i| usual * first * step.powi(i as i32)).collect();
+    let steps = LADDER.0;
+    let ladder = ladder(usual);
     let reach = ladder[steps - 1] * 1.001;
     let start = Instant::now();
     let expected = Expected::of(&scene.boxes, &scene.particles, reach).expect("the scene is finite");
     let mut calibration = Calibration::of(scene, usual);
     let prices = calibration.prices();
-    let alone = expected.best(&prices, ladder[0]).unwrap_or(usual);
-    let ours = calibration.cheapest_of(&expected.candidates(&prices, alone), &expected).unwrap_or(alone);
+    let [ours, alone] = chosen_mm(&mut calibration, &expected, ladder[0]).unwrap_or([usual; 2]);
     let calibration_ms = start.elapsed().as_secs_f64() * 1e3;
     let p_nc = share_without_contact(scene, usual);
-    let thesis = CostModel::default().analytic(measures).expect("the default model is sound");
+    let thesis = thesis_mm(scene);
     let priced = prices.model(p_nc).and_then(|model| model.analytic(measures)).unwrap_or(thesis);
     let sizes = [ours, alone, thesis, priced, usual, 1.45 * usual];
     let rules: [(&str, f64); 6] = std::array::from_fn(|at| (RULES[at], sizes[at]));
@@ -127,15 +126,34 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     }
 }
 
+/// Cell edges that are timed, mm, for a usual one.
+pub fn ladder(usual_mm: f64) -> Vec<f64> {
+    let (steps, first, step) = LADDER;
+    (0..steps).map(|i| usual_mm * first * step.powi(i as i32)).collect()
+}
+
+/// The thesis's analytic cell edge, mm.
+pub fn thesis_mm(scene: &Scene) -> f64 {
+    CostModel::default().analytic(&scene.measures).expect("the default model is sound")
+}
+
+/// The cell edge by our model and times of a sample, and by the model alone, mm.
+pub fn chosen_mm(calibration: &mut Calibration, expected: &Expected, least_mm: f64) -> Option<[f64; 2]> {
+    let prices = calibration.prices();
+    let alone = expected.best(&prices, least_mm).ok()?;
+    let timed = calibration.cheapest_of(&expected.candidates(&prices, alone), expected);
+    Some([timed.unwrap_or(alone), alone])
+}
+
 /// p_nc: the share of boxes without a particle in their cells, at the usual size.
-fn share_without_contact(scene: &Scene, usual: f64) -> f64 {
+pub fn share_without_contact(scene: &Scene, usual: f64) -> f64 {
     let busy = counts::grid(&scene.boxes, &scene.particles, usual).map_or(0, |c| c.busy_boxes);
     1.0 - (busy as f64 / scene.boxes.len() as f64).clamp(1e-4, 1.0)
 }
 
 /// Largest, best and smallest cell of the good zone, mm, hence lowest, best and highest count of
 /// cells.
-fn zone(ladder: &[f64], times: &[f64], best: usize) -> [f64; 3] {
+pub fn zone(ladder: &[f64], times: &[f64], best: usize) -> [f64; 3] {
     let good = |n: &usize| times[*n] <= ZONE * times[best];
     let low = (0..best).rev().take_while(good).last().unwrap_or(best).saturating_sub(1);
     let high = (best + 1..ladder.len()).take_while(good).last().unwrap_or(best);

@@ -95,7 +95,7 @@ fn model(file: &str) -> Option<TriMesh> {
 }
 
 /// The tetrahedra of a body.
-fn mesh(body: Body) -> TetMesh {
+pub fn mesh(body: Body) -> TetMesh {
     let ball = |p: Vec3| p.length() < RADIUS_MM;
     match body {
         Body::Ball(tets) => filled(&mask(ball), tets),

@@ -1,0 +1,116 @@
+//! Draws lines of a quantity over frames, or over another quantity, as SVG.
+//!
+//! # Practice
+//! Every line has its own colour and stands in the legend. The page's plot of cost against error is
+//! [`plot`](super::plot).
+
+use crate::engine::picture::Series;
+use crate::engine::plot::{COLOURS, tick};
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use std::ops::Range;
+
+const SIZE: (u32, u32) = (960, 300);
+/// Width of the legend's sample of a line, px.
+const SAMPLE: i32 = 16;
+
+type Fault = Box<dyn std::error::Error>;
+type Root<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+/// Draws the lines; an error says that no line has two finite points.
+pub fn svg(series: &Series) -> Result<String, Fault> {
+    let is_drawn = |y: f64| y.is_finite() && (!series.logarithmic || y > 0.0);
+    let all = || series.lines.iter().flat_map(|(_, points)| points).filter(|(x, y)| x.is_finite() && is_drawn(*y));
+    let span = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold(f64::INFINITY..f64::NEG_INFINITY, |range, v| range.start.min(v)..range.end.max(v))
+    };
+    let x = span(&mut all().map(|point| point.0));
+    let limit = series.limit.as_ref().map(|(value, _)| *value).filter(|value| is_drawn(*value));
+    let y = span(&mut all().map(|point| point.1).chain(limit));
+    if x.start >= x.end {
+        return Err(format!("{}: no line has two finite points", series.title).into());
+    }
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE)?;
+        if series.logarithmic {
+            draw(series, &root, &x, (0.8 * y.start..1.4 * y.end).log_scale(), limit)?;
+        } else {
+            let room = 0.06 * (y.end - y.start).max(1e-6);
+            draw(series, &root, &x, y.start - room..y.end + room, limit)?;
+        }
+        root.present()?;
+    }
+    Ok(svg)
+}
+
+fn draw<Y>(series: &Series, root: &Root<'_>, x: &Range<f64>, y: Y, limit: Option<f64>) -> Result<(), Fault>
+where
+    Y: AsRangedCoord<Value = f64>,
+    Y::CoordDescType: ValueFormatter<f64>,
+{
+    let mut axes = ChartBuilder::on(root)
+        .caption(&series.title, ("sans-serif", 15))
+        .margin(8)
+        .x_label_area_size(34)
+        .y_label_area_size(62)
+        .build_cartesian_2d::<Range<f64>, Y>(x.clone(), y)?;
+    let _: &RangedCoordf64 = axes.as_coord_spec().x_spec();
+    axes.configure_mesh()
+        .x_desc(&series.x)
+        .y_desc(&series.y)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&signed)
+        .light_line_style(WHITE)
+        .draw()?;
+    for (at, (name, points)) in series.lines.iter().enumerate() {
+        let colour = COLOURS[at % COLOURS.len()];
+        let seen = points.iter().copied().filter(|(_, y)| y.is_finite() && (!series.logarithmic || *y > 0.0));
+        axes.draw_series(LineSeries::new(seen, colour))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + SAMPLE, y)], colour.stroke_width(3)));
+    }
+    if let (Some(value), Some((_, name))) = (limit, &series.limit) {
+        axes.draw_series(LineSeries::new([(x.start, value), (x.end, value)], RED.mix(0.6)))?;
+        axes.draw_series([Text::new(name.clone(), (x.start, value), ("sans-serif", 12))])?;
+    }
+    axes.configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.7))
+        .label_font(("sans-serif", 12))
+        .draw()?;
+    Ok(())
+}
+
+/// Axis label of a value of either sign.
+fn signed(value: &f64) -> String {
+    if *value < 0.0 { format!("-{}", tick(&-value)) } else { tick(value) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_has_title_axes_limit_and_every_line() {
+        let line =
+            |name: &str, by: f64| (name.to_string(), (0..9).map(|n| (f64::from(n), by * f64::from(n))).collect());
+        let series = Series {
+            title: "depth by frame".into(),
+            x: "frame".into(),
+            y: "depth, mm".into(),
+            lines: vec![line("thesis", 1.0), line("ours", -0.5)],
+            limit: Some((2.0, "limit".into())),
+            logarithmic: false,
+        };
+        for series in [series.clone(), Series { logarithmic: true, ..series.clone() }] {
+            let svg = svg(&series).unwrap();
+            for text in ["depth by frame", "frame", "depth, mm", "thesis", "ours", "limit", "<polyline"] {
+                assert!(svg.contains(text), "{text} is missing");
+            }
+        }
+        assert!(svg(&Series { lines: vec![], ..series }).is_err());
+    }
+}
