@@ -172,7 +172,7 @@ impl Comparison {
     /// The reason of the verdict, with its ratio.
     pub fn reason(&self) -> String {
         let holds = self.rule == Rule::Time && self.judged() <= self.printed;
-        let bound = if holds { "the printed bound, of a machine of 2012, holds" } else { "" };
+        let bound = if holds { "the bound of 2012 holds" } else { "" };
         let all = [self.ratio().text, bound.into(), self.why.clone()];
         all.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ")
     }

@@ -30,6 +30,9 @@ const FRAME_US: f64 = 1000.0;
 const SWEEP_US: f64 = 15.0;
 /// The thesis's stiffness, N/mm.
 const STIFFNESS: f32 = 2.0;
+/// What the first depth is.
+const FIRST: &str =
+    "the first depth is the proxy's, which the sweep leaves in light touch; the rectified one is the hand's";
 /// Quantiles of the times of frames.
 pub const SHARES: [(&str, f64); 3] =
     [("slowest frame, the first included", 1.0), ("99 % of frames", 0.99), ("median frame", 0.5)];
@@ -265,7 +268,7 @@ fn printed_time(model: &str, task: &str) -> &'static str {
     match (model, task) {
         ("Cube400" | "Cube450" | "Cube500", "drilled") => "printed: some frames over 1 ms",
         ("Skull5", "drilled") => "printed: few frames over 1 ms",
-        _ => "",
+        _ => "ours reads the bone around it in the first frame",
     }
 }
 
@@ -327,7 +330,11 @@ impl ForceFigures {
         findings.series.push(Series::over_frames(title, "depth, mm", depths));
         let each = |value: &dyn Fn(&Ride) -> f64| [0, 1, 2].map(|method| value(&rides[method]));
         let mut compare = |item: &str, quantity: &str, unit: &str, rule: Rule, printed: f64, values: [f64; 3]| {
-            let why = if matches!(rule, Rule::Equal(_)) { HAND } else { "" };
+            let why = match rule {
+                Rule::Equal(_) => HAND,
+                _ if item == self.first => FIRST,
+                _ => "",
+            };
             let comparison = Comparison::new(item, quantity, unit).printed(rule, printed);
             findings.rows.push(comparison.measured(values).why(why).row());
         };
