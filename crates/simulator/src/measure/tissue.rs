@@ -380,8 +380,7 @@ fn run(
             (steps, now) = (steps + 1, now + dt_ms);
         }
         let positions = solver.positions();
-        let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
-        *force_n = loads.contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum();
+        *force_n = PressedBall::force_n(&loads.contacts, positions);
         surfaces.push(surfaces[0].moved(positions)?);
     }
     let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
@@ -403,20 +402,58 @@ struct Ball<'a> {
 }
 
 impl Ball<'_> {
-    /// Contacts at a time: a spring on each triangle under the ball, to the ball's surface there.
+    /// Contacts at a time.
     fn press(&self, rest: &Surroundings, now_ms: f32, out: &mut NodalContacts) {
         let (scene, way) = (&self.slide.scene, (now_ms - TIMES_MS[0] - TIMES_MS[1]) / TIMES_MS[2]);
-        let radius = scene.probe_radius_mm as f32;
         let in_share = (now_ms / TIMES_MS[0]).min(1.0);
-        let depth = scene.tissue_motion_mm as f32 * in_share * in_share * (3.0 - 2.0 * in_share);
-        let middle = self.ends[0].lerp(self.ends[1], way.clamp(0.0, 1.0));
+        let ball = PressedBall {
+            middle: self.ends[0].lerp(self.ends[1], way.clamp(0.0, 1.0)),
+            normal: self.normal,
+            radius_mm: scene.probe_radius_mm as f32,
+            depth_mm: scene.tissue_motion_mm as f32 * in_share * in_share * (3.0 - 2.0 * in_share),
+        };
+        ball.press(rest, out);
+    }
+}
+
+/// A ball in the tissue, without friction: every place of the surface under it is pressed along one
+/// normal.
+#[derive(Clone, Copy, Debug)]
+pub struct PressedBall {
+    /// Place of the surface at rest under the ball's middle.
+    pub middle: Vec3,
+    /// Direction away from the tissue, a unit vector.
+    pub normal: Vec3,
+    /// Radius, mm.
+    pub radius_mm: f32,
+    /// How far the ball's lowest point is under `middle`, mm.
+    pub depth_mm: f32,
+}
+
+impl PressedBall {
+    /// Stiffness of the contact at one place, N/mm.
+    pub const STIFFNESS: f32 = SPRINGS.0 / PLACES as f32;
+
+    /// Offsets of the places from the middle, perpendicular to the normal.
+    pub fn asides(&self) -> impl Iterator<Item = Vec3> {
+        disc(WIDTH * self.radius_mm, PLACES, self.normal)
+    }
+
+    /// Height of the ball's surface at an offset, along the normal, mm.
+    pub fn height_mm(&self, aside: Vec3) -> f32 {
+        let Self { middle, normal, radius_mm, depth_mm } = self;
+        middle.dot(*normal) - depth_mm + radius_mm - (radius_mm * radius_mm - aside.length_squared()).sqrt()
+    }
+
+    /// Replaces contacts by a spring on each triangle under the ball, to the ball's surface there.
+    pub fn press(&self, rest: &Surroundings, out: &mut NodalContacts) {
         // Per triangle: the spring, the sum of the ball's heights, and their number.
         let mut pressed: BTreeMap<usize, (NodalContact, f32, f32)> = BTreeMap::new();
-        for aside in disc(WIDTH * radius, PLACES, self.normal) {
-            let (triangle, nodes) = rest.under(middle + aside);
+        for aside in self.asides() {
+            let (triangle, nodes) = rest.under(self.middle + aside);
             let (spring, height, places) = pressed.entry(triangle).or_default();
             nodes.into_iter().for_each(|(node, weight)| spring.add(node, weight));
-            *height += middle.dot(self.normal) - depth + radius - (radius * radius - aside.length_squared()).sqrt();
+            *height += self.height_mm(aside);
             *places += 1.0;
         }
         out.clear();
@@ -428,10 +465,16 @@ impl Ball<'_> {
             out.push(spring);
         }
     }
+
+    /// Force of the contacts on tissue at these node positions, N.
+    pub fn force_n(contacts: &NodalContacts, positions: &[Vec3]) -> f64 {
+        let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
+        contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum()
+    }
 }
 
 /// Points of a disc, evenly distributed as in a sunflower.
-fn disc(radius: f32, count: u32, normal: Vec3) -> impl Iterator<Item = Vec3> {
+pub fn disc(radius: f32, count: u32, normal: Vec3) -> impl Iterator<Item = Vec3> {
     let (a, b) = normal.any_orthonormal_pair();
     (0..count).map(move |n| {
         let far = ((n as f32 + 0.5) / count as f32).sqrt() * radius;
@@ -441,17 +484,21 @@ fn disc(radius: f32, count: u32, normal: Vec3) -> impl Iterator<Item = Vec3> {
 }
 
 /// Surface nodes of the lower part, which the skull supports.
-fn fixed_nodes(mesh: &TetMesh) -> Vec<u32> {
+pub fn fixed_nodes(mesh: &TetMesh) -> Vec<u32> {
     let bounds = mesh.bounds();
     let top = bounds.min.z + FIXED_SHARE * bounds.size().z;
     Surface::of(mesh).nodes().into_iter().filter(|&n| mesh.positions[n as usize].z <= top).collect()
 }
 
 /// The brain's surface around the slide.
-struct Surroundings(TriMesh);
+pub struct Surroundings(TriMesh);
 
 impl Surroundings {
-    fn of(mesh: &TetMesh, place: Vec3) -> Result<Self, SessionError> {
+    /// The surface within 40 mm of a place.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn of(mesh: &TetMesh, place: Vec3) -> Result<Self, SessionError> {
         let near = |t: &[u32; 3]| t.iter().any(|&n| mesh.positions[n as usize].distance(place) < 40.0);
         let triangles: Vec<[u32; 3]> = Surface::of(mesh).triangles.into_iter().filter(near).collect();
         TriMesh::new(mesh.positions.clone(), triangles).map(Self).map_err(brain_error)
@@ -463,7 +510,7 @@ impl Surroundings {
     }
 
     /// Nearest triangle to a point, and the weights of its corners there.
-    fn under(&self, point: Vec3) -> (usize, [(u32, f32); 3]) {
+    pub fn under(&self, point: Vec3) -> (usize, [(u32, f32); 3]) {
         let (_, (triangle, location)) = self.0.project_local_point_and_get_location(point, true);
         let weights = location.barycentric_coordinates().unwrap_or([1.0, 0.0, 0.0]);
         let nodes = self.0.indices()[triangle as usize];
@@ -471,7 +518,7 @@ impl Surroundings {
     }
 
     /// The place with these weights of nodes.
-    fn at(&self, nodes: [(u32, f32); 3]) -> Vec3 {
+    pub fn at(&self, nodes: [(u32, f32); 3]) -> Vec3 {
         nodes.into_iter().map(|(node, weight)| weight * self.0.vertices()[node as usize]).sum()
     }
 }

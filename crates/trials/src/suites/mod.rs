@@ -13,10 +13,11 @@ mod population;
 mod python;
 mod render;
 pub mod rigid;
+mod rivals;
 mod scripted;
 mod simulators;
 mod thesis;
-mod tled;
+pub mod tled;
 mod volume;
 mod voxel_size;
 
@@ -31,6 +32,13 @@ pub const ON_REQUEST: &[Suite] = &[
         chart: ("displacement_mm", "jump_mm"),
         parts: population::parts,
         judge: population::judge,
+    },
+    Suite {
+        name: "rivals",
+        question: "how right and how fast are soft bodies of MuJoCo, Newton, PyBullet and scikit-fem beside TLED (fetched from Python's package index for this run)",
+        chart: ("cpu_to_rest_ms", "displacement_error_percent"),
+        parts: rivals::parts,
+        judge: rivals::judge,
     },
     Suite {
         name: "render-rivals",

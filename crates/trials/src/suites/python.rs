@@ -17,6 +17,8 @@ const PYTHON: &str = "TREPAN_PYTHON";
 pub struct Workshop {
     folder: tempfile::TempDir,
     python: PathBuf,
+    /// Packages with their versions, as `name==version`.
+    pub versions: String,
 }
 
 impl Workshop {
@@ -41,8 +43,9 @@ impl Workshop {
         };
         let list = said(Command::new(&python).args(["-m", "pip", "list", "--format", "freeze"])).unwrap_or_default();
         let named = |line: &&str| packages.iter().any(|(_, package)| line.starts_with(&format!("{package}==")));
-        println!("  {}", list.lines().filter(named).collect::<Vec<_>>().join(", "));
-        Ok(Self { folder, python })
+        let versions = list.lines().filter(named).collect::<Vec<_>>().join(", ");
+        println!("  {versions}");
+        Ok(Self { folder, python, versions })
     }
 
     /// Path of a file in the folder, which is the script's working directory.

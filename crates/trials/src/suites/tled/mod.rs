@@ -5,6 +5,7 @@ mod device;
 mod fronts;
 mod locking;
 mod motion;
+pub mod outside;
 mod region;
 mod rivals;
 mod slender;
@@ -21,6 +22,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.extend(locking::parts(scope));
     parts.extend(motion::parts());
     parts.extend([Part::new("region", region::run), Part::new("device", device::run)]);
+    parts.extend(outside::parts());
     parts.extend(slender::parts());
     parts.extend(speed::parts());
     parts.extend(stability::parts());
