@@ -64,14 +64,18 @@ enum Stop {
     Beyond,
 }
 
-/// One voxel that the per-tick law reaches.
+/// One voxel that loses density.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bite {
     voxel: IVec3,
-    hu: i16,
     /// The density that it may not pass.
     floor_hu: f32,
+    /// What it loses, HU.
+    loss_hu: f32,
 }
+
+/// A voxel that is worn, and its share of the wear, which has no unit.
+pub(crate) type Worn = (IVec3, f32);
 
 /// The cutting side of one tool.
 pub(crate) struct Burr {
@@ -175,8 +179,8 @@ impl Burr {
             return;
         }
         if let RemovalLaw::PerTick { decrement_hu } = self.law {
-            self.find_bites(bone, cut);
-            self.take(bone, decrement_hu, out);
+            self.find_bites(bone, cut, decrement_hu);
+            self.take(bone, out);
             return;
         }
         let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
@@ -244,9 +248,43 @@ impl Burr {
         self.forward = Vec3::ZERO;
         self.bites.clear();
         for voxel in voxels.take(self.limit) {
-            self.bites.push(Bite { voxel, hu: bone.ct(voxel), floor_hu: f32::from(AIR_HU) });
+            self.bites.push(Bite { voxel, floor_hu: f32::from(AIR_HU), loss_hu: decrement_hu });
         }
-        self.take(bone, decrement_hu, out);
+        self.take(bone, out);
+    }
+
+    /// Takes the density that the load of `cut` earns from voxels, in proportion to their shares.
+    /// What is too little for a whole HU stays earned.
+    pub fn erode(&mut self, bone: &BoneVolume, cut: &Cut, worn: &[Worn], out: &mut RigidStep) {
+        self.bites.clear();
+        (self.paused, self.forward) = (0, (cut.device - cut.proxy).normalize_or_zero());
+        let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
+        out.spindle_rpm = rpm;
+        let shares: f32 = worn.iter().map(|worn| worn.1).sum();
+        if earned <= 0.0 || shares <= 0.0 {
+            return;
+        }
+        self.earned_mm3 += earned;
+        // A voxel ends being bone at the isovalue: to there it has cost what whole bone costs, and
+        // what is left falls off.
+        let least = f32::from(bone.isovalue());
+        let whole = bone.voxel_mm3() / (1.0 - self.law.price(least)).max(0.01);
+        let price = |hu: f32| self.law.price(hu.max(least));
+        let cost_mm3 = |from: f32, loss: f32| whole * (price(from) - price(from - loss));
+        let mut spent_mm3 = 0.0;
+        for &(voxel, share) in worn.iter().take(self.limit) {
+            let hu = f32::from(bone.ct(voxel));
+            let loss_hu = (self.earned_mm3 * share / (shares * cost_mm3(hu, 1.0).max(1e-9))).floor();
+            let loss_hu = loss_hu.min(hu - f32::from(AIR_HU));
+            if loss_hu >= 1.0 {
+                spent_mm3 += cost_mm3(hu, loss_hu);
+                self.bites.push(Bite { voxel, floor_hu: f32::from(AIR_HU), loss_hu });
+            }
+        }
+        // Bone that is used up earns nothing for later.
+        self.earned_mm3 = (self.earned_mm3 - spent_mm3).clamp(0.0, KEPT_TICKS * earned);
+        // Voxels are gone as a whole, whatever density they had.
+        out.removed_mm3 = self.take(bone, out) as f32 * bone.voxel_mm3();
     }
 
     /// Lists the bone that the burr may take some of when it goes `most`, nodes, but none nearer
@@ -366,7 +404,7 @@ impl Burr {
 
     /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device,
     /// or on its surface.
-    fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut) {
+    fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut, loss_hu: f32) {
         let (device, proxy) = (bone.grid_of(cut.device), bone.grid_of(cut.proxy));
         let radius = cut.radius_mm / bone.spacing_mm();
         let way = device - proxy;
@@ -381,31 +419,34 @@ impl Burr {
                 let from_way = (off - along.clamp(0.0, length) * forward).length();
                 let floor_hu = (iso + RAMP_HU * (from_way - radius)).max(f32::from(AIR_HU));
                 if along >= -1.0 && from_way < radius + 1.0 && f32::from(hu) > floor_hu && bites.len() < *limit {
-                    bites.push(Bite { voxel, hu, floor_hu });
+                    bites.push(Bite { voxel, floor_hu, loss_hu });
                 }
             }
         });
     }
 
-    /// Lowers each bite's density by `loss` whole HU, not below its floor.
-    fn take(&mut self, bone: &BoneVolume, loss: f32, out: &mut RigidStep) {
+    /// Lowers each bite's density by whole HU, not below its floor. Returns how many voxels stop
+    /// being bone.
+    fn take(&mut self, bone: &BoneVolume, out: &mut RigidStep) -> u32 {
         let iso = f32::from(bone.isovalue());
         let fraction = |hu: f32| (0.5 + (hu - iso) / PARTIAL_HU).clamp(0.0, 1.0);
-        let mut removed = 0.0;
+        let (mut removed, mut opened) = (0.0, 0);
         self.has_opened = false;
         for bite in &self.bites {
-            let from = f32::from(bite.hu);
-            let whole = loss.round().clamp(0.0, (from - bite.floor_hu).floor());
+            let from = f32::from(bone.ct(bite.voxel));
+            let whole = bite.loss_hu.round().clamp(0.0, (from - bite.floor_hu).floor());
             if whole >= 1.0 {
                 bone.set_hu(bite.voxel, (from - whole) as i16);
                 removed += fraction(from) - fraction(from - whole);
                 if from >= iso && from - whole < iso {
                     self.has_opened = true;
+                    opened += 1;
                     out.broke_through |= self.forward != Vec3::ZERO && is_free(bone, bite.voxel, self.forward);
                 }
             }
         }
         out.removed_mm3 = removed * bone.voxel_mm3();
+        opened
     }
 }
 

@@ -3,11 +3,15 @@
 mod common;
 use common::{at, bone, directions, held, walk};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
-use trepan_rigid::rivals::{centre_line, mesh_shell, pointshell, thesis};
+use trepan_rigid::rivals::{centre_line, exposed_faces, mesh_shell, pointshell, thesis, voxel_sum};
 use trepan_rigid::{Extent, Method, RigidContact, RigidStep};
 use trepan_volume::BoneVolume;
 
 const THESIS: [Method; 2] = [Method::of(&thesis::METHOD), Method::of(&thesis::AS_PRINTED)];
+/// Methods that take voxels which the tool's surface goes through, whole: half the diagonal of a
+/// voxel further than the tool goes.
+const BY_VOXELS: [Method; 4] =
+    [THESIS[0], THESIS[1], Method::of(&exposed_faces::METHOD), Method::of(&voxel_sum::METHOD)];
 /// Methods that do not take a whole voxel away within the stroke of the test.
 const SLOW: [Method; 3] =
     [Method::of(&pointshell::AVERAGE), Method::of(&pointshell::SUM), Method::of(&centre_line::METHOD)];
@@ -142,9 +146,7 @@ fn drilling_removes_bone_and_only_where_the_burr_has_been() {
                 lost += 1;
                 let voxel = [i % 28, i / 28 % 28, i / 784];
                 let centre = after.centre_of(voxel).as_vec3();
-                // The thesis takes voxels that hold points of the shell: half the diagonal of a
-                // voxel more.
-                let reach = 2.001 + if THESIS.contains(&method) { 0.5 * 0.87 } else { 0.0 };
+                let reach = 2.001 + if BY_VOXELS.contains(&method) { 0.5 * 0.87 } else { 0.0 };
                 assert!(strokes.iter().any(|&s| distance(centre, s) < reach), "{} at {centre}", method.name());
             }
         }

@@ -14,8 +14,8 @@
 //! World mm. A few looks per vertex and tick, since only its own way is searched.
 //!
 //! # Sources
-//! F. Asenjo, *Haptic and visual simulation of bone milling*, KTH 2008, "line approximation
-//! algorithm", as the thesis tells it (2.3.1).
+//! N. Asenjo, *Multipoint collision detection algorithm for bone milling and drilling in a haptic
+//! VR surgery simulator*, KTH 2008, "line approximation algorithm", as the thesis tells it (2.3.1).
 //!
 //! # When not to use it
 //! For burrs that are seen: the line has no thickness, so that a burr sinks in to its centre before
@@ -150,8 +150,8 @@ fn swept(bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Vec3 {
 
 /// Unit normal of the density at `point`, out of the bone; zero where there is no slope.
 fn normal(bone: &BoneVolume, point: Vec3) -> Vec3 {
-    let step = 0.5 * bone.spacing_mm();
-    let along = |axis: Vec3| over_iso(bone, point - step * axis) - over_iso(bone, point + step * axis);
+    let at = bone.grid_of(point);
+    let along = |axis: Vec3| over_iso(bone, at - 0.5 * axis) - over_iso(bone, at + 0.5 * axis);
     Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or_zero()
 }
 

@@ -9,13 +9,19 @@
 //! Penalties against thin walls: past the middle of a wall the nearest way out leads to the far
 //! side, and a fast tool is through between two ticks.
 
-use crate::burr::{Burr, Cut};
+use crate::burr::{Burr, Cut, Worn};
 use crate::nodes::Nodes;
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
+use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
+
+/// Penetration of a flat wall at which the force of every rival is that of the caller's spring, mm:
+/// 1 N at 2 N/mm. A rival whose force is not in proportion to the depth is softer above, stiffer
+/// below it, or the other way round.
+pub(crate) const REFERENCE_MM: f32 = 0.5;
 
 /// A method's own part.
 pub(crate) trait Rival: Send {
@@ -64,6 +70,22 @@ impl Held {
         if self.cuts {
             self.burr.wear(bone, voxels, out);
         }
+    }
+
+    /// Where the burr cuts in this tick, wears these voxels with what its load earns, `depth_mm`
+    /// deep along `normal`.
+    pub fn erode(&mut self, bone: &BoneVolume, worn: &[Worn], normal: Vec3, depth_mm: f32, out: &mut RigidStep) {
+        if self.cuts && depth_mm.is_finite() && self.dt_ms.is_finite() && self.dt_ms > 0.0 {
+            let proxy = self.proxy.translation;
+            let (radius_mm, dt_ms) = (self.tool.tip_radius_mm, self.dt_ms);
+            let cut = Cut { device: proxy - depth_mm * normal, proxy, radius_mm, side: Vec3::ZERO, depth_mm, dt_ms };
+            self.burr.erode(bone, &cut, worn, out);
+        }
+    }
+
+    /// Time since the last tick, ms; nothing where that is no time.
+    pub fn tick_ms(&self) -> Option<f32> {
+        (self.dt_ms.is_finite() && self.dt_ms > 0.0).then_some(self.dt_ms)
     }
 
     /// Fills the manifold for a ball that touches under the proxy, if normal and depth are
@@ -125,6 +147,11 @@ impl<R: Rival> RigidContact for Framed<R> {
 pub(crate) trait PenaltyProbe: Send {
     /// What the tool at `pose` feels; `None` without contact. Fills contacts and counts of `out`.
     fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt>;
+
+    /// The voxels that a burr wears which feels this; `None` for one that cuts by its shape.
+    fn wears(&mut self, _bone: &BoneVolume, _tool: &Tool, _pose: &Pose, _felt: &Felt) -> Option<&[Worn]> {
+        None
+    }
 }
 
 /// A contact as a whole.
@@ -141,10 +168,16 @@ impl<P: PenaltyProbe> Rival for P {
     fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
         held.proxy = tool.world_from_tool;
         let felt = self.feel(bone, &held.tool, &tool.world_from_tool, out);
-        let Some(Felt { normal, depth_mm, burr }) = felt else { return };
+        let Some(felt) = felt else { return };
+        let Felt { normal, depth_mm, burr } = felt;
         held.proxy.translation += depth_mm * normal;
         held.report(normal, depth_mm, out);
-        if burr != Vec3::ZERO {
+        if !held.cuts {
+            return;
+        }
+        if let Some(worn) = self.wears(bone, &held.tool, &tool.world_from_tool, &felt) {
+            held.erode(bone, worn, normal, depth_mm, out);
+        } else if burr != Vec3::ZERO {
             held.cut(bone, tool.tip(), tool.tip() + burr, burr.length(), out);
         }
     }
@@ -161,13 +194,37 @@ pub(crate) fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<F
     (depth_mm > 0.0 && depth_mm.is_finite()).then_some(Felt { normal, depth_mm, burr: depth_mm * normal })
 }
 
-/// The answer of points that push together: the direction of `push`, the depth of the deepest of
-/// the contacts in `out` along it.
-pub(crate) fn deepest(push: Vec3, out: &mut RigidStep) -> Option<Felt> {
-    out.voxels_in_contact = out.points_in_contact;
-    let normal = push.normalize_or_zero();
-    let depth = out.manifold.contacts().iter().map(|c| c.depth_mm * c.normal.dot(normal)).fold(0.0, f32::max);
-    answer(push, depth, out)
+/// What the points of a shell push.
+pub(crate) struct Pushes(Vec<Contact>);
+
+impl Pushes {
+    /// Room for all points of a shell.
+    pub fn room(shell: &Pointshell) -> Self {
+        Self(Vec::with_capacity(shell.points.len()))
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Adds a point's push, also to the contacts of `out`.
+    pub fn push(&mut self, contact: Contact, out: &mut RigidStep) {
+        out.points_in_contact += 1;
+        out.manifold.push(contact);
+        if self.0.len() < self.0.capacity() {
+            self.0.push(contact);
+        }
+    }
+
+    /// The direction of all pushes together, and the depth of the deepest along it.
+    pub fn deepest(&self, out: &mut RigidStep) -> Option<Felt> {
+        out.voxels_in_contact = out.points_in_contact;
+        let push: Vec3 = self.0.iter().map(|c| c.depth_mm * c.normal).sum();
+        let normal = push.normalize_or_zero();
+        let depth = self.0.iter().map(|c| c.depth_mm * c.normal.dot(normal)).fold(0.0, f32::max);
+        answer(push, depth, out)
+    }
 }
 
 /// So many points on the ball at a tool's tip.

@@ -20,65 +20,79 @@
 //! # When not to use it
 //! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
 
-use super::frame::{Felt, PenaltyProbe, ball_shell, deepest, framed};
+use super::frame::{Felt, PenaltyProbe, Pushes, ball_shell, framed};
+use super::shell::Shell;
 use crate::RigidStep;
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
+use glam::IVec3;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-struct Rays(Pointshell);
+struct Rays {
+    shell: Shell,
+    pushes: Pushes,
+}
 
 impl PenaltyProbe for Rays {
     fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
-        let mut push = Vec3::ZERO;
-        for (point, inward) in self.0.iter() {
-            let point = pose.translation + point;
-            let over = over_iso(bone, point);
+        self.pushes.clear();
+        let still = Pose::from_translation(pose.translation);
+        self.shell.near(bone, &still, (1, 0.0), |near| {
+            out.voxels_swept += 1;
+            let over = over_iso(bone, near.grid);
             if over > 0.0 {
-                let depth_mm = way_out(bone, point, inward, over, tool.tip_radius_mm, &mut out.voxels_swept);
-                push += depth_mm * inward;
-                out.points_in_contact += 1;
-                out.manifold.push(Contact { point, normal: inward, depth_mm });
+                let ray = (near.grid, near.inward);
+                let depth_mm = way_out(bone, ray, over, tool.tip_radius_mm, &mut out.voxels_swept);
+                self.pushes.push(Contact { point: near.point, normal: near.inward, depth_mm }, out);
             }
-        }
-        out.voxels_swept += self.0.points.len() as u32;
-        deepest(push, out)
+        });
+        self.pushes.deepest(out)
     }
 }
 
-/// The way from `point`, which is `over` HU in bone, along `inward` to the isovalue, at most
-/// `longest`, mm.
-pub(crate) fn way_out(bone: &BoneVolume, point: Vec3, inward: Vec3, over: f32, longest: f32, visited: &mut u32) -> f32 {
-    let step = 0.5 * bone.spacing_mm();
+/// The way from a place in voxels, which is `over` HU in bone, along a unit vector to the isovalue,
+/// at most `longest`, mm.
+pub(crate) fn way_out(
+    bone: &BoneVolume,
+    (from, inward): (Vec3, Vec3),
+    over: f32,
+    longest: f32,
+    visited: &mut u32,
+) -> f32 {
+    const STEP: f32 = 0.5;
+    let longest = longest / bone.spacing_mm();
     let (mut way, mut before) = (0.0, over);
     while way < longest {
         *visited += 1;
-        let now = over_iso(bone, point + (way + step) * inward);
+        let now = over_iso(bone, from + (way + STEP) * inward);
         if now <= 0.0 {
-            return (way + step * before / (before - now)).min(longest);
+            way = (way + STEP * before / (before - now)).min(longest);
+            break;
         }
-        (way, before) = (way + step, now);
+        (way, before) = (way + STEP, now);
     }
-    longest
+    way.min(longest) * bone.spacing_mm()
 }
 
-/// Trilinear density over the isovalue, HU; positive in bone.
-pub(crate) fn over_iso(bone: &BoneVolume, point: Vec3) -> f32 {
-    let at = bone.grid_of(point);
-    let low = at.floor();
-    let (f, g, corner) = (at - low, 1.0 - (at - low), low.as_ivec3());
-    let hu = |x, y, z| f32::from(bone.hu(corner + glam::IVec3::new(x, y, z)));
-    let along = |y, z| g.x * hu(0, y, z) + f.x * hu(1, y, z);
-    g.z * (g.y * along(0, 0) + f.y * along(1, 0)) + f.z * (g.y * along(0, 1) + f.y * along(1, 1))
-        - f32::from(bone.isovalue())
+/// Trilinear density at a place in voxels over the isovalue, HU; positive in bone.
+#[inline]
+pub(crate) fn over_iso(bone: &BoneVolume, at: Vec3) -> f32 {
+    // Without SSE 4.1 the standard floor is a call.
+    let cut = at.as_ivec3();
+    let low = cut - IVec3::from(at.cmplt(cut.as_vec3()));
+    let (f, hu) = (at - low.as_vec3(), bone.corners(low).map(f32::from));
+    let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    let face = |c: usize| mix(mix(hu[c], hu[c + 1], f.x), mix(hu[c + 2], hu[c + 3], f.x), f.y);
+    mix(face(0), face(4), f.z) - f32::from(bone.isovalue())
 }
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
     points: Pointshell::RIGID_COUNT,
     ..Descriptor::of("ray-trace", "Petersik et al. 2002, Morris et al. 2006", |tool, points| {
-        framed(tool, RemovalLaw::RATE, Rays(ball_shell(tool, points)))
+        let shell = ball_shell(tool, points);
+        framed(tool, RemovalLaw::RATE, Rays { pushes: Pushes::room(&shell), shell: Shell::new(&shell) })
     })
 };

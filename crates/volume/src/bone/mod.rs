@@ -198,6 +198,37 @@ impl BoneVolume {
         self.index(voxel).map_or(AIR_HU, |at| self.shown(at, voxel))
     }
 
+    /// Densities at the corners of the cell whose lowest is `low`, x fastest, HU; each as
+    /// [`hu`](Self::hu), with one test for the grid's borders.
+    #[inline]
+    pub fn corners(&self, low: IVec3) -> [i16; 8] {
+        let [nx, ny, _] = self.dims;
+        match (self.index(low), self.index(low + 1)) {
+            (Some(at), Some(_)) if !self.is_cut_near(self.cut.nodes * low, self.cut.nodes * (low + 1)) => {
+                let pair = |at: usize| {
+                    let pair = &self.hu[at..at + 2];
+                    [pair[0].load(Ordering::Relaxed), pair[1].load(Ordering::Relaxed)]
+                };
+                let ([a, b], [c, d]) = (pair(at), pair(at + nx));
+                let ([e, f], [g, h]) = (pair(at + nx * ny), pair(at + nx * ny + nx));
+                [a, b, c, d, e, f, g, h]
+            }
+            _ => core::array::from_fn(|c| self.hu(low + IVec3::new(c as i32 & 1, c as i32 >> 1 & 1, c as i32 >> 2))),
+        }
+    }
+
+    /// Reads the densities of the voxels along x from `start` on, HU; each as [`hu`](Self::hu).
+    #[inline]
+    pub fn read_row(&self, start: IVec3, out: &mut [i16]) {
+        let end = start + (out.len().max(1) - 1) as i32 * IVec3::X;
+        match (self.index(start), self.index(end)) {
+            (Some(at), Some(_)) if !self.is_cut_near(self.cut.nodes * start, self.cut.nodes * end) => {
+                out.iter_mut().zip(&self.hu[at..]).for_each(|(out, hu)| *out = hu.load(Ordering::Relaxed));
+            }
+            _ => out.iter_mut().zip(0..).for_each(|(out, i)| *out = self.hu(start + i * IVec3::X)),
+        }
+    }
+
     #[inline]
     fn shown(&self, at: usize, voxel: IVec3) -> i16 {
         self.ramped(self.hu[at].load(Ordering::Relaxed), self.cut.at(self.cut.nodes * voxel))
@@ -402,6 +433,27 @@ mod tests {
         assert_eq!(found, [[0, 0, 0], [1, 1, 1]]);
         assert_eq!(bone.changed(&mut seen, 9, |_| panic!("seen")), 0);
         assert_eq!(bone.snapshot().get([5, 3, 4]), Some(AIR_HU));
+    }
+
+    #[test]
+    fn cells_and_rows_are_what_single_voxels_are_at_the_border_and_in_a_cut_too() {
+        let bone = BoneVolume::new(&ball(), 400).unwrap();
+        let nodes = bone.cut_nodes();
+        let same = |bone: &BoneVolume| {
+            for at in 0..22 * 20 * 19 {
+                let low = IVec3::new(at % 22, at / 22 % 20, at / 440) - 1;
+                let each = |c: i32| bone.hu(low + IVec3::new(c & 1, c >> 1 & 1, c >> 2));
+                assert_eq!(bone.corners(low), core::array::from_fn(|c| each(c as i32)), "{low}");
+                let mut row = [0; 5];
+                bone.read_row(low, &mut row);
+                assert_eq!(row, core::array::from_fn(|x| bone.hu(low + x as i32 * IVec3::X)), "{low}");
+            }
+        };
+        same(&bone);
+        let eight = nodes * IVec3::new(8, 5, 6);
+        assert!(bone.cut_writer().set_eight(eight, [CUT_SURFACE + 300; 8], 0xFF));
+        same(&bone);
+        assert!(bone.hu(eight / nodes) < 400);
     }
 
     #[test]
