@@ -42,7 +42,7 @@ const WORDS: [(&str, &[&str]); 6] = [
     ("thread::sleep", &["simulator", "trials", "emulators"]),
     ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
     ("std::fs", &["volume", "mesh", "link", "haptics", "render", "simulator", "trials", "emulators"]),
-    ("unsafe {", &["haptics", "tled", "simulator", "emulators"]),
+    ("unsafe {", &["haptics", "soft", "simulator", "emulators"]),
 ];
 
 /// All faults found, each one line.

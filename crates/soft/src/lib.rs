@@ -37,6 +37,7 @@ mod method;
 mod operator;
 mod pressure;
 pub mod rivals;
+pub mod simd;
 mod solver;
 mod tetra;
 

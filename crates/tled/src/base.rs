@@ -3,9 +3,9 @@
 use crate::bound::Bound;
 use crate::config::{Config, Damping};
 use crate::dynamic_scaling::DynamicScaling;
-use crate::layout::Layout;
 use crate::scaling::Scaling;
 use trepan_geometry::Vec3;
+use trepan_soft::simd::Layout;
 use trepan_soft::{Body, BodyError, NodeState, Stiffness, lowest_frequency_of};
 
 /// Share of the present stable step that a substep may use.

@@ -16,12 +16,12 @@
 
 use crate::dynamic_scaling::DynamicScaling;
 use crate::element::{deformation, deformation_of, forces};
-use crate::lane::{Lane, NODES, Quad, WIDTH};
 use crate::law::{Constitutive, Deformation, Stress};
-use crate::pass::{Pass, PassReport};
 use crate::relaxation::Fade;
 use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
+use trepan_soft::simd::{Lane, NODES, Quad, WIDTH};
+use trepan_soft::simd::{Pass, PassReport};
 use trepan_soft::{Material, Shape, element_omega2};
 
 /// Sixteen tetrahedra with K material constants each. Unused lanes have zero stiffness and add zero

@@ -14,7 +14,7 @@
 //! T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures, 2000,
 //! chapter 6 (mass scaling; stable step by elements).
 
-use crate::lane::{Lane, WIDTH};
+use trepan_soft::simd::{Lane, WIDTH};
 
 /// Which elements count as stiffened, and how much mass they may get.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,8 +8,8 @@
 //! S and q come from the material. J̄ is J, or with averaged pressure the mean volume ratio of the
 //! corners' node groups; p resists inversion (`law.rs`).
 
-use crate::lane::{Lane, dot};
 use crate::law::{Deformation, Stress};
+use trepan_soft::simd::{Lane, dot};
 
 /// Computes the deformation from `u_a - u_0` and ∇N_a, a = 1..3.
 #[inline(always)]

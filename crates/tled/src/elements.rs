@@ -3,17 +3,17 @@
 use crate::config::Config;
 use crate::dynamic_scaling::DynamicScaling;
 use crate::force_slots::ForceSlots;
-use crate::lane::{NODES, WIDTH};
-use crate::layout::{Layout, kind};
 use crate::node_groups::NodeGroups;
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, PartGroups, Quiet};
-use crate::pass::PassReport;
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
 use crate::team::{Team, Work};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
+use trepan_soft::simd::PassReport;
+use trepan_soft::simd::{Layout, kind};
+use trepan_soft::simd::{NODES, WIDTH};
 
 /// Elements of a part: enough that gathering is cheap, few enough that its nodes stay in the L1
 /// cache.
@@ -132,7 +132,7 @@ fn sorted(values: impl Iterator<Item = u32>) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::Kernel;
+    use trepan_soft::simd::Kernel;
     use trepan_soft::{Material, boxes};
 
     #[test]

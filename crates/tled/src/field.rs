@@ -5,9 +5,9 @@
 //! that begin and end a round order these accesses, so the numbers themselves use relaxed loads and
 //! stores, as fast as plain memory.
 
-use crate::lane::Quad;
 use glam::Vec4;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+use trepan_soft::simd::Quad;
 
 /// Array of rows of four numbers.
 pub(crate) struct Field(Vec<[AtomicU64; 2]>);

@@ -12,8 +12,8 @@
 //! `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1. Its reasons stand in
 //! `trepan_soft::Law`, the f64 version of this file.
 
-use crate::lane::{Lane, squared};
 use crate::principal::{Symmetric, principal};
+use trepan_soft::simd::{Lane, squared};
 use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
 
 /// Deformation of an element as the laws need it.

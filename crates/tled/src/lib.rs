@@ -50,14 +50,10 @@ mod field;
 mod force_slots;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-mod kernel;
-mod lane;
 mod law;
-mod layout;
 mod node_groups;
 mod nodes;
 mod part;
-mod pass;
 mod principal;
 mod relaxation;
 mod scaling;
@@ -65,11 +61,9 @@ mod settle;
 mod stiffness;
 mod team;
 mod tled;
-#[cfg(target_arch = "x86_64")]
-mod x86;
 
 pub use config::{Config, Damping};
-pub use kernel::Kernel;
 pub use relaxation::Relaxation;
 pub use settle::{Settled, Settling};
 pub use tled::{Pass, Tled};
+pub use trepan_soft::simd::Kernel;

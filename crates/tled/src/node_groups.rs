@@ -10,8 +10,8 @@
 //! the simulation would diverge where neighbours differ in stiffness by 1:1000. With one group per
 //! material a bar of two materials is exact.
 
-use crate::layout::Layout;
 use trepan_soft::Body;
+use trepan_soft::simd::Layout;
 
 /// The node groups of a body: one per node, more where materials meet and volumes are averaged.
 pub(crate) struct NodeGroups {

@@ -9,12 +9,12 @@
 use crate::damping::RigidMotion;
 use crate::field::{Field, Scalars};
 use crate::force_slots::ForceSlots;
-use crate::layout::Layout;
 use glam::Vec4;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
+use trepan_soft::simd::Layout;
 
 /// State of all nodes, by place.
 pub(crate) struct Nodes {

@@ -23,15 +23,15 @@ use crate::block::{Block, Forces, Memory, Strain, Volumes};
 use crate::config::Config;
 use crate::dynamic_scaling::DynamicScaling;
 use crate::force_slots::ForceSlots;
-use crate::kernel::Kernel;
-use crate::lane::{NODES, Quad, WIDTH};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::nodes::Nodes;
-use crate::pass::PassReport;
 use crate::relaxation::Fade;
 use crate::scaling::Scaling;
 use glam::Vec4;
 use std::marker::PhantomData;
+use trepan_soft::simd::Kernel;
+use trepan_soft::simd::PassReport;
+use trepan_soft::simd::{NODES, Quad, WIDTH};
 use trepan_soft::{Body, Law};
 
 /// Some elements of one law, with copies of their nodes and the last force sums.

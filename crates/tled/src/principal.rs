@@ -5,7 +5,7 @@
 //! `t = 2 a_pq / (d ± √(d² + 4 a_pq²))`, `d = a_qq - a_pp`, with the sign of d; four sweeps reach
 //! f32 precision. Equal eigenvalues need no special case.
 
-use crate::lane::Lane;
+use trepan_soft::simd::Lane;
 
 /// A symmetric tensor as xx, yy, zz, xy, xz, yz.
 pub(crate) type Symmetric<L> = [L; 6];

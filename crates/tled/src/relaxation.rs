@@ -13,8 +13,8 @@
 //! Taylor, Comas, Cheng, Passenger, Hawkes, Atkinson, Ourselin, Med. Image Anal. 13 (2009). Brain:
 //! Miller and Chinzei 2002.
 
-use crate::lane::Lane;
 use trepan_soft::BodyError;
+use trepan_soft::simd::Lane;
 
 /// Two Prony terms; a share of 0 = no term.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

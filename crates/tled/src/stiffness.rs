@@ -12,8 +12,8 @@
 //! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of
 //! a neo-Hookean solid with the same moduli; their additional stiffening is in the first term.
 
-use crate::lane::{Lane, dot, squared};
 use crate::law::{Deformation, Stress};
+use trepan_soft::simd::{Lane, dot, squared};
 
 /// The bound A times rest volume, from the isochoric stress and (μ V, κ V).
 #[inline(always)]

@@ -12,14 +12,14 @@
 //! Workers spin for a few microseconds after a round, then yield, then sleep.
 
 use crate::force_slots::ForceSlots;
-use crate::kernel::Kernel;
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, Quiet};
-use crate::pass::PassReport;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
+use trepan_soft::simd::Kernel;
+use trepan_soft::simd::PassReport;
 
 const SPINS: u32 = 4000;
 const YIELDS: u32 = 64;

@@ -9,18 +9,27 @@
 //! differences as in [`super::linear`].
 //!
 //! # Practice
-//! About 20 ns a tetrahedron and step, f64, no allocation.
+//! About 4 ns a tetrahedron and step, f32, sixteen elements and springs at once, no allocation.
 //!
 //! # When not to use it
 //! Where a force must be right: edges never point evenly, so stiffness depends on how they lie, and
 //! no finer mesh makes it better.
+//!
+//! # Sources
+//! Provot 1995: internal force of a mesh of masses and springs, `-Σ K (l - l₀ l/|l|)`. Liberties:
+//! tetrahedra instead of a cloth's grid; stiffness from the shear modulus, as Lloyd, Székely and
+//! Harders 2007 derive it from the linear element; the pressure, whose energy is that of a
+//! tetrahedron's volume in Teschner et al. 2004; central differences instead of Euler's step;
+//! damping by mass instead of along springs; no limit on stretch.
 
-use crate::body::Element;
-use crate::energy::cofactor;
 use crate::method::Descriptor;
 use crate::rivals::nodes::Nodes;
-use crate::{Body, BodyError, Loads, NodeState, SoftSolver, StepReport};
-use glam::{DMat3, DVec3};
+use crate::rivals::parts::{
+    Action, Block, Item, Motion, Parts, Rows, gradients_of, minus, plus, scaled, tetrahedra, times,
+};
+use crate::simd::{Lane, dot};
+use crate::{Body, BodyError, Loads, Material, NodeState, SoftSolver, StepReport};
+use glam::Vec4;
 use std::collections::BTreeMap;
 
 pub use crate::rivals::nodes::Config;
@@ -30,77 +39,133 @@ const DEFAULT: Config = Config { damping_per_ms: None, safety: 0.9 };
 
 /// Mass-spring solver.
 pub struct MassSpring {
-    springs: Vec<Spring>,
-    elements: Vec<Element>,
-    /// κ' by material, MPa.
-    pressures: Vec<f64>,
+    /// Two springs a lane.
+    springs: Parts<10>,
+    elements: Parts<10>,
     nodes: Nodes,
-    force: Vec<DVec3>,
+    of_springs: Vec<Vec4>,
+    force: Vec<Vec4>,
     stable_dt_ms: f64,
 }
 
 /// An edge.
+#[derive(Clone, Copy)]
 struct Spring {
     ends: [u32; 2],
     length_mm: f64,
     stiffness: f64,
 }
 
+/// Forces of two springs a lane: edge at rest, stiffness and length of each.
+struct Pull;
+
+impl Action<10> for Pull {
+    #[inline(always)]
+    fn act<L: Lane>(&self, block: &mut Block<10>, lanes: usize, x: &mut Rows, sums: &mut Rows) -> u32 {
+        let corners = block.corners::<L>(lanes);
+        let [a, b, c, d] =
+            [L::gather(x, corners[0]), L::gather(x, corners[1]), L::gather(x, corners[2]), L::gather(x, corners[3])];
+        let (f, g) = (pull(block, lanes, 0, &minus(&b, &a)), pull(block, lanes, 5, &minus(&d, &c)));
+        let none = [L::splat(0.0); 3];
+        L::add_rows([f, minus(&none, &f), g, minus(&none, &g)], sums, corners);
+        0
+    }
+}
+
+/// Force on the first end of a spring whose ends moved apart by `d`, N. Without a difference of
+/// large numbers, `l - l₀ = (2 e·d + d·d)/(l + l₀)`, e the edge at rest.
+#[inline(always)]
+fn pull<L: Lane>(block: &Block<10>, lanes: usize, first: usize, d: &[L; 3]) -> [L; 3] {
+    let (edge, at_rest) = (block.vector(lanes, first), block.number::<L>(lanes, first + 4));
+    let apart = plus(&edge, d);
+    let length = dot(&apart, &apart).sqrt().at_least(1e-9);
+    let longer = (dot(&edge, d) + dot(&edge, d) + dot(d, d)) / (length + at_rest);
+    scaled(&apart, block.number::<L>(lanes, first + 3) * longer / length)
+}
+
+/// Forces of the pressure `κ' (J - 1)`: gradients and κ'V of each tetrahedron.
+struct Press;
+
+impl Action<10> for Press {
+    #[inline(always)]
+    fn act<L: Lane>(&self, block: &mut Block<10>, lanes: usize, x: &mut Rows, sums: &mut Rows) -> u32 {
+        let gradients = block.gradients::<L>(lanes, 0);
+        let motion = Motion::of(&block.edges::<L>(lanes, x), &gradients);
+        let pressure = L::splat(0.0) - block.number::<L>(lanes, 9) * motion.excess;
+        let [g, h, i] = gradients;
+        let more = times(&motion.cofactor_less_one(), &gradients);
+        let forces = [
+            scaled(&plus(&g, &more[0]), pressure),
+            scaled(&plus(&h, &more[1]), pressure),
+            scaled(&plus(&i, &more[2]), pressure),
+        ];
+        block.add(lanes, forces, sums);
+        motion.inverted()
+    }
+}
+
+/// κ' of a material, MPa.
+fn made_up(material: &Material) -> f64 {
+    (material.bulk_mpa() - material.shear_mpa() * 5.0 / 3.0).max(0.0)
+}
+
 impl MassSpring {
     /// Takes a body at rest.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
         let nodes = config.nodes(body)?;
-        let made_up = |m: &crate::Material| (m.bulk_mpa() - m.shear_mpa() * 5.0 / 3.0).max(0.0);
-        let mut solver = Self {
-            springs: springs(body),
-            elements: body.elements(),
-            pressures: body.materials.iter().map(made_up).collect(),
+        let springs = springs(body);
+        let constants = |t: usize| {
+            let shape = body.shape(t);
+            let gradients = gradients_of(&shape);
+            let pressure = (made_up(body.material(t)) * shape.volume_mm3) as f32;
+            std::array::from_fn(|row| if row < 9 { gradients[row] } else { pressure })
+        };
+        Ok(Self {
+            stable_dt_ms: f64::from(config.safety) * bound_ms(body, &springs),
+            springs: Parts::spread(&pairs(body, &springs)),
+            elements: Parts::spread(&tetrahedra(body, constants)),
+            of_springs: nodes.u.clone(),
             force: nodes.u.clone(),
             nodes,
-            stable_dt_ms: 0.0,
-        };
-        solver.stable_dt_ms = f64::from(config.safety) * solver.bound_ms(body);
-        Ok(solver)
-    }
-
-    /// `2/ω` with ω² no less than the largest: Gershgorin's circles for the springs, single
-    /// elements for the pressure.
-    fn bound_ms(&self, body: &Body) -> f64 {
-        let mut around = vec![0.0; self.nodes.masses.len()];
-        self.springs.iter().for_each(|s| s.ends.iter().for_each(|&n| around[n as usize] += 2.0 * s.stiffness));
-        let of_springs = around.iter().zip(&self.nodes.masses).map(|(k, m)| k / m).fold(0.0, f64::max);
-        let of_pressure = |t: usize| {
-            let slopes: f64 = self.elements[t].shape.gradients.iter().map(|g| g.length_squared()).sum();
-            let pressure = self.pressures[usize::from(self.elements[t].material)];
-            4.0 * pressure * slopes / f64::from(body.material(t).density_g_mm3())
-        };
-        2.0 / (of_springs + (0..self.elements.len()).map(of_pressure).fold(0.0, f64::max)).sqrt()
+        })
     }
 
     /// Forces of springs and pressure; gives the number of inverted elements.
     fn pull(&mut self) -> u32 {
-        self.force.fill(DVec3::ZERO);
-        let Nodes { rest, u, .. } = &self.nodes;
-        for Spring { ends: [a, b], length_mm, stiffness } in &self.springs {
-            let [a, b] = [*a as usize, *b as usize];
-            let apart = (rest[b] + u[b]) - (rest[a] + u[a]);
-            let length = apart.length().max(1e-9);
-            let force = apart * (stiffness * (1.0 - length_mm / length));
-            self.force[a] += force;
-            self.force[b] -= force;
-        }
-        let mut inverted = 0;
-        for Element { corners, shape, material } in &self.elements {
-            let f = DMat3::IDENTITY + shape.gradient_of(self.nodes.corners(corners));
-            let j = f.determinant();
-            inverted += u32::from(j <= 0.0);
-            let stress = cofactor(f) * (self.pressures[usize::from(*material)] * (j - 1.0));
-            for (&n, force) in corners.iter().zip(shape.forces_of(stress)) {
-                self.force[n as usize] -= force;
-            }
-        }
+        self.springs.sum(&Pull, &self.nodes.u, &mut self.of_springs);
+        let inverted = self.elements.sum(&Press, &self.nodes.u, &mut self.force);
+        self.force.iter_mut().zip(&self.of_springs).for_each(|(f, of_springs)| *f += *of_springs);
         inverted
     }
+}
+
+/// `2/ω` with ω² no less than the largest, ms: Gershgorin's circles for the springs, single
+/// elements for the pressure.
+fn bound_ms(body: &Body, springs: &[Spring]) -> f64 {
+    let masses = body.lumped_masses_g();
+    let mut around = vec![0.0; masses.len()];
+    springs.iter().for_each(|s| s.ends.iter().for_each(|&n| around[n as usize] += 2.0 * s.stiffness));
+    let of_springs = around.iter().zip(&masses).map(|(k, m)| k / m).fold(0.0, f64::max);
+    let of_pressure = |t: usize| {
+        let slopes: f64 = body.shape(t).gradients.iter().map(|g| g.length_squared()).sum();
+        4.0 * made_up(body.material(t)) * slopes / f64::from(body.material(t).density_g_mm3())
+    };
+    2.0 / (of_springs + (0..body.mesh.tets.len()).map(of_pressure).fold(0.0, f64::max)).sqrt()
+}
+
+/// Two springs each; the last may stand alone.
+fn pairs(body: &Body, springs: &[Spring]) -> Vec<Item<10>> {
+    let rows = |spring: &Spring| {
+        let [a, b] = spring.ends.map(|n| body.mesh.positions[n as usize].as_dvec3());
+        let edge = (b - a).as_vec3();
+        [edge.x, edge.y, edge.z, spring.stiffness as f32, spring.length_mm as f32]
+    };
+    let pair = |two: &[Spring]| {
+        let other = two.get(1).copied().unwrap_or(Spring { stiffness: 0.0, ..two[0] });
+        let (nodes, rows) = ([two[0].ends, other.ends].concat(), [rows(&two[0]), rows(&other)].concat());
+        Item { nodes: std::array::from_fn(|i| nodes[i]), constants: std::array::from_fn(|i| rows[i]) }
+    };
+    springs.chunks(2).map(pair).collect()
 }
 
 impl SoftSolver for MassSpring {
@@ -150,7 +215,8 @@ pub const METHOD: Descriptor = Descriptor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Material, boxes};
+    use crate::boxes;
+    use glam::Mat3;
     use trepan_geometry::Vec3;
 
     #[test]
@@ -158,15 +224,21 @@ mod tests {
         let mesh = boxes::split_box([2; 3], Vec3::splat(20.0));
         let body = Body::uniform(mesh, vec![], Material::BRAIN);
         let mut solver = MassSpring::new(&body, &Config::default()).unwrap();
-        let (strain, turn) = (1e-5, DMat3::from_rotation_y(0.7));
-        solver.nodes.u = solver.nodes.rest.iter().map(|x| *x * strain).collect();
+        let (strain, turn) = (1e-5, Mat3::from_rotation_y(0.7));
+        solver.nodes.u = solver.nodes.rest.iter().map(|x| (*x * strain).extend(0.0)).collect();
         solver.pull();
         // The virial of the nodal forces is -3 p V, p = 3 κ ε.
-        let virial: f64 = solver.nodes.rest.iter().zip(&solver.force).map(|(x, f)| x.dot(*f)).sum();
-        let exact = -9.0 * body.material(0).bulk_mpa() * strain * 8000.0;
+        let virial: f64 =
+            solver.nodes.rest.iter().zip(&solver.force).map(|(x, f)| f64::from(x.dot(f.truncate()))).sum();
+        let exact = -9.0 * body.material(0).bulk_mpa() * f64::from(strain) * 8000.0;
         assert!((virial / exact - 1.0).abs() < 1e-3, "{virial} {exact}");
-        solver.nodes.u = solver.nodes.rest.iter().map(|x| turn * *x - *x).collect();
+        solver.nodes.u = solver.nodes.rest.iter().map(|x| (turn * *x - *x).extend(0.0)).collect();
         solver.pull();
-        assert!(solver.force.iter().all(|f| f.length() < 1e-12));
+        // The same nodes moved by their displacements along one axis: what is no rigid motion.
+        let turned = solver.force.iter().map(|f| f.length()).fold(0.0, f32::max);
+        solver.nodes.u.iter_mut().for_each(|u| *u *= Vec4::X);
+        solver.pull();
+        let sheared = solver.force.iter().map(|f| f.length()).fold(0.0, f32::max);
+        assert!(turned < 1e-6 * sheared, "{turned} N turned, {sheared} N sheared");
     }
 }

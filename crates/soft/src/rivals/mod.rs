@@ -4,5 +4,6 @@ pub mod corotational;
 pub mod linear;
 pub mod mass_spring;
 mod nodes;
+mod parts;
 pub mod reference;
 pub mod xpbd;

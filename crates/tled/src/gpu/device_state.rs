@@ -1,10 +1,10 @@
 //! What the device keeps between steps: the nodes' state and the numbers of the step, as
 //! `step.wgsl` declares them.
 
-use crate::layout::Layout;
 use crate::nodes::inverse_masses_and_weights;
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_soft::Body;
+use trepan_soft::simd::Layout;
 
 /// The uniform of every pass; the fields stand in the order of `step.wgsl`.
 #[repr(C)]

@@ -17,11 +17,11 @@ use crate::gpu::groups;
 use crate::gpu::pass::Pass;
 use crate::gpu::topology::Topology;
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
-use crate::layout::{Layout, kind};
 use crate::scaling::Scaling;
 use trepan_gpu::Slot::{Storage, StorageMut, Uniform};
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_shaders::TLED_FORCES;
+use trepan_soft::simd::{Layout, kind};
 use trepan_soft::{Body, Law};
 
 /// Elements on the device and the kernels of their forces.

@@ -9,10 +9,10 @@
 //!         │ place 0│     place 1     │ …         a place: a node
 //! ```
 
-use crate::layout::Layout;
 use crate::node_groups::{NodeGroups, Runs};
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_soft::Body;
+use trepan_soft::simd::Layout;
 
 /// The mesh on the device.
 pub(crate) struct Topology {

@@ -10,12 +10,12 @@ use crate::gpu::forces::Forces;
 use crate::gpu::groups;
 use crate::gpu::pass::Pass;
 use crate::gpu::topology::{Topology, owners};
-use crate::layout::Layout;
 use crate::node_groups::NodeGroups;
 use trepan_gpu::Slot::{Storage, StorageMut, Uniform};
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_shaders::TLED_VOLUMES;
 use trepan_soft::Body;
+use trepan_soft::simd::Layout;
 
 /// The passes of averaged pressure, in their order.
 pub(crate) fn passes(

@@ -8,22 +8,20 @@ use std::ops::{Add, Div, Mul, Sub};
 use wide::{f32x8, u32x8};
 
 /// Tetrahedra in a block.
-pub(crate) const WIDTH: usize = 16;
+pub const WIDTH: usize = 16;
 
 /// A 16-byte row of four numbers: a node's displacement or a force, and padding.
-pub(crate) type Quad = [f32; 4];
+pub type Quad = [f32; 4];
 
 /// Rows of a part's tables, at least its nodes. A node number modulo this power of two is always
 /// inside, so that kernels read and add rows without a check and a branch each.
-pub(crate) const NODES: usize = 4096;
+pub const NODES: usize = 4096;
 
 /// A register of f32, one lane per element.
 ///
-/// Implementations are always inlined: the instructions of [`x86`](crate::x86) registers are
+/// Implementations are always inlined: the instructions of x86 registers are
 /// available only inside their kernel.
-pub(crate) trait Lane:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
-{
+pub trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
     /// Number of lanes; a divisor of [`WIDTH`].
     const LANES: usize;
     /// Sets every lane to the same number.
@@ -137,13 +135,13 @@ pub(crate) trait Lane:
 
 /// Scalar product.
 #[inline(always)]
-pub(crate) fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
+pub fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Sum of the squares of three rows.
 #[inline(always)]
-pub(crate) fn squared<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> L {
+pub fn squared<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> L {
     dot(a, a) + dot(b, b) + dot(c, c)
 }
 
@@ -162,16 +160,16 @@ const EXP2: [f32; 7] = [
 ];
 
 /// `2^23`: the low bits of `2^23 + n` are n; and the same plus the exponent bias.
-pub(crate) const WHOLE: f32 = 8_388_608.0;
-pub(crate) const BIASED: f32 = WHOLE + 127.0;
+pub const WHOLE: f32 = 8_388_608.0;
+pub const BIASED: f32 = WHOLE + 127.0;
 /// Fraction bits of a float, and the bits of 1.0.
-pub(crate) const FRACTION: u32 = 0x007F_FFFF;
-pub(crate) const ONE: u32 = 0x3F80_0000;
+pub const FRACTION: u32 = 0x007F_FFFF;
+pub const ONE: u32 = 0x3F80_0000;
 /// Sign bit of a float.
-pub(crate) const SIGN: u32 = 0x8000_0000;
+pub const SIGN: u32 = 0x8000_0000;
 
 /// Subtracting a third of a float's bits from this gives its rough inverse cube root.
-pub(crate) const ROOT_BITS: u32 = 0x54A2_FA8C;
+pub const ROOT_BITS: u32 = 0x54A2_FA8C;
 
 impl Lane for f32 {
     const LANES: usize = 1;

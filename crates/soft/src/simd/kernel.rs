@@ -1,8 +1,8 @@
 //! The kernels of the element forces, and their selection for this CPU.
 
-use crate::pass::{Pass, PassReport};
+use super::pass::{Pass, PassReport};
 #[cfg(target_arch = "x86_64")]
-use crate::x86;
+use super::x86;
 use wide::f32x8;
 
 /// Implementation of the element forces; all give the same bytes.
@@ -51,7 +51,7 @@ impl Kernel {
     }
 
     /// The kernel that `Fastest` selects on this CPU; any other kernel unchanged.
-    pub(crate) fn resolved(self) -> Self {
+    pub fn resolved(self) -> Self {
         match self {
             Self::Fastest => [Self::Avx512, Self::Avx2].into_iter().find(|k| k.runs_here()).unwrap_or(Self::Wide),
             other => other,
@@ -60,7 +60,7 @@ impl Kernel {
 
     /// Runs a pass with this kernel.
     #[inline]
-    pub(crate) fn run<P: Pass>(self, pass: &mut P) -> PassReport {
+    pub fn run<P: Pass>(self, pass: &mut P) -> PassReport {
         match self {
             Self::Scalar => pass.run::<f32>(),
             #[cfg(target_arch = "x86_64")]

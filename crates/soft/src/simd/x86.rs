@@ -16,8 +16,8 @@
     reason = "the instructions are unsafe to call where the compiler cannot see that the CPU has them"
 )]
 
-use crate::lane::{BIASED, FRACTION, Lane, NODES, ONE, Quad, ROOT_BITS, SIGN, WHOLE, WIDTH};
-use crate::pass::{Pass, PassReport};
+use super::lane::{BIASED, FRACTION, Lane, NODES, ONE, Quad, ROOT_BITS, SIGN, WHOLE, WIDTH};
+use super::pass::{Pass, PassReport};
 use std::arch::x86_64::*;
 use std::mem::transmute;
 use std::ops::{Add, Div, Mul, Sub};
@@ -31,17 +31,17 @@ struct Ymm(__m256);
 struct Zmm(__m512);
 
 /// Whether this CPU can run [`avx2`].
-pub(crate) fn has_avx2() -> bool {
+pub fn has_avx2() -> bool {
     is_x86_feature_detected!("avx2")
 }
 
 /// Whether this CPU can run [`avx512`].
-pub(crate) fn has_avx512() -> bool {
+pub fn has_avx512() -> bool {
     is_x86_feature_detected!("avx512f")
 }
 
 /// Runs a pass over some blocks, eight elements at once.
-pub(crate) fn avx2<P: Pass>(pass: &mut P) -> PassReport {
+pub fn avx2<P: Pass>(pass: &mut P) -> PassReport {
     assert!(has_avx2());
     #[target_feature(enable = "avx2")]
     fn run<P: Pass>(pass: &mut P) -> PassReport {
@@ -52,7 +52,7 @@ pub(crate) fn avx2<P: Pass>(pass: &mut P) -> PassReport {
 }
 
 /// Runs a pass over some blocks, sixteen elements at once.
-pub(crate) fn avx512<P: Pass>(pass: &mut P) -> PassReport {
+pub fn avx512<P: Pass>(pass: &mut P) -> PassReport {
     assert!(has_avx512());
     #[target_feature(enable = "avx512f")]
     fn run<P: Pass>(pass: &mut P) -> PassReport {

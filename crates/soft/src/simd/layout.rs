@@ -4,11 +4,11 @@
 //! Nodes are sorted along a Morton curve, elements by law and then by their lowest node. The
 //! elements of one law run through one kernel, and the nodes of consecutive elements are in cache.
 
+use crate::{Body, Law};
 use trepan_geometry::Vec3;
-use trepan_soft::{Body, Law};
 
 /// Solver order of nodes and elements.
-pub(crate) struct Layout {
+pub struct Layout {
     /// Mesh node at each place of the solver's order.
     pub node_at: Vec<u32>,
     /// Place of each mesh node.
@@ -18,6 +18,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// The order for a body.
     pub fn of(body: &Body) -> Self {
         let mesh = &body.mesh;
         let bounds = mesh.bounds();
@@ -38,7 +39,7 @@ impl Layout {
 }
 
 /// Number of the constitutive law of a tetrahedron.
-pub(crate) fn kind(body: &Body, tet: u32) -> u8 {
+pub fn kind(body: &Body, tet: u32) -> u8 {
     match body.material(tet as usize).law() {
         Law::NeoHookean(_) => 0,
         Law::StVenantKirchhoff { .. } => 1,
@@ -56,7 +57,7 @@ fn morton(p: Vec3) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trepan_soft::{Material, boxes};
+    use crate::{Material, boxes};
 
     #[test]
     fn every_node_and_element_has_one_place() {
