@@ -69,6 +69,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
             )
             .with("machine", by.machine())
             .metric("frame_p50_ms", 1e-3 * times.quantile(0.5))
+            .metric("frame_spread_percent", 100.0 * times.spread())
             .metric("frames_per_s", 1e6 / times.quantile(0.5))
             .metric("image_error_percent", image.error_percent(&reference))
             .metric("ssim", similarity(&image, &reference));

@@ -223,6 +223,7 @@ fn off_percent(
             .with("tets", body.mesh.tets.len())
             .with("steps_to_rest", settled.steps)
             .metric("step_p50_us", times.quantile(0.5))
+            .metric("step_spread_percent", 100.0 * times.spread())
             .metric(COST, cost_ms)
             .metric("left_mm", f64::from(settled.left_mm))
             .metric(of, found.length())

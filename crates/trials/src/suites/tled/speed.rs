@@ -3,6 +3,7 @@
 
 use super::{Part, Scope};
 use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use trepan_geometry::{Vec3, units};
@@ -12,12 +13,18 @@ use trepan_tled::{Config, Kernel, Relaxation, Tled};
 /// About 22 thousand tetrahedra: the thesis's brain.
 const BRAIN: [usize; 3] = [18, 17, 12];
 
-/// A solver and the best time of its steps.
+/// A solver and the times of its steps.
 struct Run {
     name: String,
     solver: Tled,
     tets: usize,
-    best_us: f64,
+    step_us: Vec<f64>,
+}
+
+impl Run {
+    fn best_us(&self) -> f64 {
+        self.step_us.iter().copied().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Every row.
@@ -37,7 +44,7 @@ fn gravity() -> Loads {
 
 fn prepared(name: impl Into<String>, body: &Body, config: &Config) -> Run {
     let solver = Tled::new(body, config).expect("the block is sound");
-    Run { name: name.into(), solver, tets: body.mesh.tets.len(), best_us: f64::INFINITY }
+    Run { name: name.into(), solver, tets: body.mesh.tets.len(), step_us: Vec::new() }
 }
 
 /// Round by round, so that a busy moment of the machine hits all alike; the best of each is
@@ -45,7 +52,7 @@ fn prepared(name: impl Into<String>, body: &Body, config: &Config) -> Run {
 fn race(runs: &mut [Run], rounds: usize) {
     for _ in 0..rounds {
         for run in runs.iter_mut() {
-            run.best_us = run.best_us.min(step_us(&mut run.solver));
+            run.step_us.push(step_us(&mut run.solver));
         }
     }
 }
@@ -62,8 +69,8 @@ fn kernels(scope: Scope, findings: &mut Findings) {
     let mut runs: Vec<Run> = configs().iter().map(|(name, config)| prepared(*name, &body, config)).collect();
     race(&mut runs, scope.pick(120, 1000));
     let bytes = |run: &Run| run.solver.positions().iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
-    let best_of = |wanted: &str| runs.iter().find(|run| run.name == wanted).map(|run| run.best_us);
-    let (scalar, first, plain) = (bytes(&runs[0]), runs[0].best_us, best_of("fastest").unwrap_or(f64::NAN));
+    let best_of = |wanted: &str| runs.iter().find(|run| run.name == wanted).map(Run::best_us);
+    let (scalar, first, plain) = (bytes(&runs[0]), runs[0].best_us(), best_of("fastest").unwrap_or(f64::NAN));
     for run in &runs {
         if !run.name.contains('+') {
             let same = f64::from(bytes(run) == scalar);
@@ -72,8 +79,8 @@ fn kernels(scope: Scope, findings: &mut Findings) {
         }
         findings.rows.push(
             row(&scene, run)
-                .metric("times_faster_than_scalar", first / run.best_us)
-                .metric("cost_over_plain", run.best_us / plain),
+                .metric("times_faster_than_scalar", first / run.best_us())
+                .metric("cost_over_plain", run.best_us() / plain),
         );
     }
     for (kernel, times) in [("avx512", 3.0), ("avx2", 2.0)] {
@@ -89,8 +96,9 @@ fn kernels(scope: Scope, findings: &mut Findings) {
 fn row(scene: &str, run: &Run) -> Row {
     Row::new(scene, &run.name)
         .with("tets", run.tets)
-        .metric("step_best_us", run.best_us)
-        .metric("ns_per_tetrahedron", 1e3 * run.best_us / run.tets as f64)
+        .metric("step_best_us", run.best_us())
+        .metric("step_spread_percent", 100.0 * Samples::from(run.step_us.clone()).spread())
+        .metric("ns_per_tetrahedron", 1e3 * run.best_us() / run.tets as f64)
 }
 
 fn configs() -> Vec<(&'static str, Config)> {
@@ -113,7 +121,7 @@ fn sizes(scope: Scope, findings: &mut Findings) {
     let mut runs: Vec<Run> =
         [9, 15, 20, 24].iter().map(|&n| prepared("fastest", &block([n; 3]), &Config::default())).collect();
     race(&mut runs, scope.pick(40, 400));
-    let costs: Vec<f64> = runs.iter().map(|run| run.best_us / run.tets as f64).collect();
+    let costs: Vec<f64> = runs.iter().map(|run| run.best_us() / run.tets as f64).collect();
     runs.iter().for_each(|run| findings.rows.push(row(&format!("size, {} tetrahedra", run.tets), run)));
     let (low, high) = costs.iter().fold((f64::MAX, 0.0f64), |(l, h), &c| (l.min(c), h.max(c)));
     findings.gates.push(Gate::at_most("cost of an element, 5 to 80 thousand: dearest over cheapest", high / low, 1.3));
