@@ -63,6 +63,23 @@ impl<I> Indexed<I> {
     pub fn new(index: I, tets: usize) -> Self {
         Self { index, boxes: Vec::with_capacity(tets) }
     }
+
+    /// Forgets the tetrahedra of the last step.
+    pub(crate) fn clear(&mut self) {
+        self.boxes.clear();
+    }
+
+    /// Takes a tetrahedron when its box meets the region and there is room.
+    pub(crate) fn offer(&mut self, tet: u32, bounds: Extent, region: &Extent) {
+        if bounds.overlaps(region) {
+            push_bounded(&mut self.boxes, (tet, bounds));
+        }
+    }
+
+    /// Brings the tetrahedra into ascending order.
+    pub(crate) fn sort(&mut self) {
+        self.boxes.sort_unstable_by_key(|(tet, _)| *tet);
+    }
 }
 
 impl<I: PointIndex> BroadPhase for Indexed<I> {

@@ -6,23 +6,23 @@ mod common;
 use common::{Random, block, deformed};
 use glam::{DVec3, Vec3};
 use trepan_deformable::rivals::*;
-use trepan_deformable::{BroadPhase, Indexed};
+use trepan_deformable::{BroadPhase, Indexed, SearchInputs};
 use trepan_geometry::Aabb;
 use trepan_mesh::TetMesh;
 
 fn all(mesh: &TetMesh, cell_mm: f32, points: usize) -> Vec<(&'static str, Box<dyn BroadPhase>)> {
-    let tets = mesh.tets.len();
+    let (tets, inputs) = (mesh.tets.len(), SearchInputs { mesh, points, cell_mm });
     vec![
         ("uniform grid", Box::new(Indexed::new(UniformGrid::new(cell_mm, points), tets))),
         ("hashed grid", Box::new(Indexed::new(HashedGrid::new(cell_mm, points), tets))),
         ("octree", Box::new(Indexed::new(Octree::new(points), tets))),
         ("k-d tree", Box::new(Indexed::new(KdTree::new(points), tets))),
-        ("box tree", Box::new(VolumeTree::<Aabox>::new(&mesh.positions, &mesh.tets))),
-        ("ball tree", Box::new(VolumeTree::<Sphere>::new(&mesh.positions, &mesh.tets))),
-        ("k-DOP tree", Box::new(VolumeTree::<KDop>::new(&mesh.positions, &mesh.tets))),
-        ("turned box tree", Box::new(VolumeTree::<Obb>::new(&mesh.positions, &mesh.tets))),
+        ("box tree", Box::new(VolumeTree::<Aabox>::new(&inputs))),
+        ("ball tree", Box::new(VolumeTree::<Sphere>::new(&inputs))),
+        ("k-DOP tree", Box::new(VolumeTree::<KDop>::new(&inputs))),
+        ("turned box tree", Box::new(VolumeTree::<Obb>::new(&inputs))),
         ("hybrid tree", Box::new(HybridTree::new(&mesh.positions, &mesh.tets))),
-        ("parry", Box::new(ParryTree::new(&mesh.positions, &mesh.tets))),
+        ("parry", Box::new(ParryTree::new(&inputs))),
     ]
 }
 

@@ -10,6 +10,7 @@ pub mod hashed_grid;
 pub mod hybrid_tree;
 pub mod k_dop;
 pub mod kd_tree;
+mod motion;
 pub mod obb;
 pub mod octree;
 pub mod parry_tree;

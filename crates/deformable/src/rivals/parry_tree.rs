@@ -1,17 +1,21 @@
 //! The ready-made tree: parry's `Bvh`, each leaf one tetrahedron's box.
 //!
 //! # Practice
-//! Built by parry's binned surface-area heuristic, leaves updated in place, refitted without
-//! rebuilding. A leaf whose tetrahedron is nowhere keeps its last box and gives no pair. Nothing is
-//! allocated after `new`.
+//! Built by parry's binned surface-area heuristic. The tool's box, wider by as much as any node can
+//! have moved since (`motion.rs`), asks the tree in one descent; what it finds is tested with its
+//! present box. When that margin is over half of an edge, all leaves are updated and the tree is
+//! refitted. A leaf whose tetrahedron is nowhere keeps its last places. Nothing is allocated after
+//! `new`.
 //!
 //! # When not to use it
-//! For one small tool, as all trees that follow every tetrahedron.
+//! When all nodes leap in every step: the whole tree is then refitted in each.
 
-use crate::bounded::push_bounded;
+use super::UniformGrid;
+use super::motion::{Fitted, Motion};
 use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, box_of};
+use crate::phase::{BroadPhase, Indexed, Phased, box_of};
+use crate::seam::SearchInputs;
 use parry3d::bounding_volume::Aabb as Box3;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use trepan_geometry::{Aabb, Vec3};
@@ -19,15 +23,37 @@ use trepan_geometry::{Aabb, Vec3};
 /// Parry's bounding-volume hierarchy.
 pub struct ParryTree {
     tree: Bvh,
-    boxes: Vec<Extent>,
+    motion: Motion,
+    fitted: Fitted,
+    loose_mm: f32,
+    near: Indexed<UniformGrid>,
 }
+
+/// Margin over which the tree is refitted, as a share of a grid cell (1.45 edges).
+const LOOSE: f32 = 0.35;
 
 impl ParryTree {
     /// A tree over a mesh at rest.
-    pub fn new(positions: &[Vec3], tets: &[[u32; 4]]) -> Self {
-        let boxes: Vec<Extent> = tets.iter().map(|tet| box_of(positions, tet)).collect();
-        let leaves: Vec<Box3> = boxes.iter().map(to_parry).collect();
-        Self { tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves), boxes }
+    pub fn new(inputs: &SearchInputs) -> Self {
+        let (positions, tets) = (&inputs.mesh.positions, &inputs.mesh.tets);
+        let leaves: Vec<Box3> = tets.iter().map(|tet| to_parry(&box_of(positions, tet))).collect();
+        let (motion, fitted) = Motion::of(positions);
+        Self {
+            tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
+            motion,
+            fitted,
+            loose_mm: LOOSE * inputs.cell_mm,
+            near: Indexed::new(UniformGrid::new(inputs.cell_mm, inputs.points), tets.len()),
+        }
+    }
+
+    /// Fits every leaf to the last places of its nodes.
+    fn refit(&mut self, tets: &[[u32; 4]]) {
+        for (t, tet) in tets.iter().enumerate() {
+            self.tree.insert_or_update_partially(to_parry(&box_of(&self.motion.places, tet)), t as u32, 0.0);
+        }
+        self.tree.refit_without_opt();
+        self.fitted = self.motion.now();
     }
 }
 
@@ -36,32 +62,27 @@ fn to_parry(b: &Extent) -> Box3 {
 }
 
 impl BroadPhase for ParryTree {
-    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], _region: &Aabb) {
-        for (t, tet) in tets.iter().enumerate() {
-            self.boxes[t] = box_of(positions, tet);
-            if self.boxes[t] != Extent::EMPTY {
-                self.tree.insert_or_update_partially(to_parry(&self.boxes[t]), t as u32, 0.0);
+    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
+        self.motion.follow(positions);
+        if self.motion.since(self.fitted) > self.loose_mm {
+            self.refit(tets);
+        }
+        self.near.clear();
+        let region = Extent::from(*region);
+        let wide = region.widened(self.motion.since(self.fitted));
+        if wide.low.cmple(wide.high).all() {
+            for t in self.tree.intersect_aabb(&to_parry(&wide)) {
+                self.near.offer(t, box_of(positions, &tets[t as usize]), &region);
             }
         }
-        self.tree.refit_without_opt();
+        self.near.sort();
     }
 
     fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
-        out.clear();
-        let mut overflow = 0;
-        for (i, &p) in points.iter().enumerate().filter(|(_, p)| p.is_finite()) {
-            for t in self.tree.intersect_aabb(&Box3::new(p, p)) {
-                if self.boxes[t as usize].contains(p) {
-                    overflow += push_bounded(out, [i as u32, t]);
-                }
-            }
-        }
-        out.sort_unstable_by_key(|&[point, tet]| (tet, point));
-        overflow
+        self.near.pairs(points, out)
     }
 }
 
 /// The tree of the crate parry.
-pub const METHOD: Descriptor = Descriptor::of("parry-tree", "parry3d", |inputs| {
-    Box::new(Phased::new(ParryTree::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
-});
+pub const METHOD: Descriptor =
+    Descriptor::of("parry-tree", "parry3d", |inputs| Box::new(Phased::new(ParryTree::new(inputs), inputs.points)));

@@ -1,59 +1,49 @@
-//! Balls as bounding volumes (Hubbard 1996; refitted as in James and Pai 2004's BD-tree, but
-//! bottom-up).
+//! Balls as bounding volumes (Hubbard 1996).
 //!
 //! # Theory
-//! The ball of two balls with centres a distance d apart: the larger one, when it holds the other
-//! (r ≥ d + s), else one of radius (d + r + s)/2 on the line through both centres. A tetrahedron's
-//! ball is round its centroid.
+//! The ball of some nodes is centred in their box and reaches the furthest of them. A margin m
+//! along each axis is at most √3 m along any direction.
 //!
 //! # Practice
-//! 16 bytes and one distance for each test, the same in every direction; each merge loosens the
-//! ball, so the upper levels are much larger than what they hold.
+//! 16 bytes and one distance for each test, the same in every direction.
+//!
+//! # Sources
+//! Hubbard 1996, section 3: a tree of balls, tested top-down. Liberties: his balls come from the
+//! medial axis of a rigid body, these from halving the tetrahedra. James and Pai 2004 move balls by
+//! reduced coordinates, which a mesh of free nodes does not have.
 
 use super::volume_tree::{Volume, search};
+use crate::extent::Extent;
 use crate::method::Descriptor;
 use trepan_geometry::Vec3;
 
-/// A ball; empty when its radius is negative.
+/// A ball.
 #[derive(Clone, Copy, Debug)]
 pub struct Sphere {
     centre: Vec3,
     radius: f32,
 }
 
-/// Rounding of radius and centre, as a share of their size.
-const ROUNDING: f32 = 4e-7;
+/// Rounding of radius and distance, as a share of their size.
+const ROUNDING: f32 = 1e-6;
 
 impl Volume for Sphere {
-    fn for_points(_: &[Vec3]) -> Self {
-        Self { centre: Vec3::ZERO, radius: -1.0 }
+    fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self {
+        let mut extent = Extent::EMPTY;
+        points.clone().for_each(|p| extent.grow(p));
+        let centre = Vec3::from(0.5 * (extent.low + extent.high));
+        let radius = points.map(|p| p.distance_squared(centre)).fold(0.0, f32::max).sqrt();
+        Self { centre, radius: radius + ROUNDING * (radius + centre.abs().max_element()) }
     }
 
-    fn clear(&mut self) {
-        self.radius = -1.0;
+    #[inline]
+    fn meets(&self, low: Vec3, high: Vec3, margin_mm: f32) -> bool {
+        let reach = (self.radius + 3f32.sqrt() * margin_mm) * (1.0 + ROUNDING);
+        (low - self.centre).max(self.centre - high).max(Vec3::ZERO).length_squared() <= reach * reach
     }
 
-    fn add_corners(&mut self, corners: &[Vec3; 4]) {
-        let centre = corners.iter().sum::<Vec3>() * 0.25;
-        let radius = corners.iter().map(|c| c.distance_squared(centre)).fold(0.0, f32::max).sqrt();
-        self.add_child(&Self { centre, radius: radius + ROUNDING * (radius + centre.abs().max_element()) });
-    }
-
-    fn add_child(&mut self, child: &Self) {
-        let apart = self.centre.distance(child.centre);
-        if child.radius < 0.0 || self.radius >= apart + child.radius {
-            return;
-        }
-        if self.radius < 0.0 || child.radius >= apart + self.radius {
-            return *self = *child;
-        }
-        let radius = 0.5 * (apart + self.radius + child.radius);
-        self.centre += (child.centre - self.centre) * ((radius - self.radius) / apart);
-        self.radius = radius + ROUNDING * (radius + self.centre.abs().max_element());
-    }
-
-    fn holds(&self, p: Vec3) -> bool {
-        self.radius >= 0.0 && self.centre.distance_squared(p) <= self.radius * self.radius * (1.0 + ROUNDING)
+    fn size_mm(&self) -> f32 {
+        2.0 * self.radius
     }
 }
 

@@ -1,60 +1,68 @@
-//! A tree of bounding volumes over the tetrahedra, built at rest, refitted bottom-up to the moved
-//! mesh.
+//! A tree of bounding volumes over the tetrahedra, asked with the tool's box in one descent and
+//! refitted only where the tool is.
 //!
 //! # Theory
-//! Van den Bergen 1997: in a deforming body the tree keeps its shape, only its volumes follow,
-//! children before parents. The tree is made by halving the tetrahedra at the median of their
-//! centres along the longest side. A point goes down every branch whose volume holds it.
+//! The tree is made at rest by halving the tetrahedra at the median of their centres along the
+//! longest side, and keeps its shape. A volume is fitted to the nodes below it. Later it counts as
+//! wider by as much as any node can have moved since (`motion.rs`); where the tool's box meets a
+//! volume whose margin has grown over a tenth of its size, it is fitted anew.
 //!
 //! ```text
 //!      [0]         one volume for each node, of any kind: box, ball, k-DOP, turned box
 //!     /   \
-//!   [1]   [4]      children lie behind their parent, so one pass backwards refits
+//!   [1]   [4]      the tool's box goes down where it meets a volume with its margin
 //!   / \   / \
-//! [2] [3] …
+//! [2] [3] …        a leaf: its tetrahedra's own boxes, then points against those
 //! ```
 //!
 //! # Practice
-//! O(tetrahedra) for each refit, O(log tetrahedra) for a point as long as volumes overlap little;
-//! large deformation makes them overlap more, never wrong. The last test is against the
+//! One pass over the coordinates of all nodes, then O(log tetrahedra) and what lies near the tool;
+//! a large volume is fitted seldom, since its margin may grow more. The last test is against the
 //! tetrahedron's own box, so that all kinds give the same pairs.
 //!
 //! # When not to use it
-//! For one small tool: the refit costs more than a scan over all boxes. It pays with many points
-//! that lie far apart.
+//! When all nodes leap in every step: each look then fits every volume on the way down.
+//!
+//! # Sources
+//! Van den Bergen 1997, section 4: the tree keeps its shape and all of it is refitted, children
+//! before parents, in every step. Larsson and Akenine-Möller 2001: what is not looked at need not
+//! be refitted. Liberties: fitted to the mesh instead of to children, which is as tight as it can
+//! be; margins by the largest motion, in place of James and Pai 2004, whose balls take theirs from
+//! reduced coordinates: a mesh of free nodes has none.
 
-use crate::bounded::push_bounded;
+use super::UniformGrid;
+use super::motion::{Fitted, Motion};
 use crate::extent::Extent;
-use crate::phase::{BroadPhase, Phased, box_of};
+use crate::phase::{BroadPhase, Indexed, Phased, box_of};
 use crate::seam::{Search, SearchInputs};
+use crate::surface::distinct_rows;
 use trepan_geometry::{Aabb, Vec3};
+use trepan_mesh::Csr;
 
-/// Something that holds points, and can be made to hold more.
+/// Something that holds points.
 pub trait Volume: Copy + Send {
-    /// An empty volume for these points at rest; one with directions takes them from here and keeps
-    /// them.
-    fn for_points(points: &[Vec3]) -> Self;
+    /// The volume of some finite points, at least one.
+    fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self;
 
-    /// Holds nothing any more.
-    fn clear(&mut self);
+    /// Whether it meets a box from `low` to `high` when it is wider by a margin along each axis,
+    /// mm. True in doubt.
+    fn meets(&self, low: Vec3, high: Vec3, margin_mm: f32) -> bool;
 
-    /// Holds a tetrahedron with these finite corners too.
-    fn add_corners(&mut self, corners: &[Vec3; 4]);
-
-    /// Holds all that a child holds too.
-    fn add_child(&mut self, child: &Self);
-
-    /// Whether a point lies inside, with nothing lost to rounding.
-    fn holds(&self, p: Vec3) -> bool;
+    /// Its longest side or diameter, mm.
+    fn size_mm(&self) -> f32;
 }
 
 /// A binary tree of bounding volumes.
 #[derive(Debug)]
 pub struct VolumeTree<V> {
     volumes: Vec<V>,
+    fitted: Vec<Fitted>,
     shape: Vec<Node>,
     order: Vec<u32>,
-    boxes: Vec<Extent>,
+    /// Mesh nodes below each node of the tree.
+    nodes: Csr,
+    motion: Motion,
+    near: Indexed<UniformGrid>,
 }
 
 /// What a node stands for: `order[first..last]`; a leaf when `right` is 0. The left child is the
@@ -76,68 +84,73 @@ impl Node {
 /// Most tetrahedra in a leaf.
 pub(crate) const LEAF: usize = 8;
 
+/// Margin over which a volume is fitted anew, as a share of its size.
+const LOOSE: f32 = 0.1;
+
 impl<V: Volume> VolumeTree<V> {
-    /// A tree over a mesh at rest.
-    pub fn new(positions: &[Vec3], tets: &[[u32; 4]]) -> Self {
-        let (shape, order) = halved(positions, tets);
-        let corners = |n: &Node| -> Vec<Vec3> {
-            n.tets(&order).iter().flat_map(|&t| tets[t as usize].map(|c| positions[c as usize])).collect()
-        };
+    /// A tree over a mesh at rest, halved from the top.
+    pub fn new(inputs: &SearchInputs) -> Self {
+        Self::of_shape(inputs, halved(&inputs.mesh.positions, &inputs.mesh.tets))
+    }
+
+    /// A tree of any shape, with the tetrahedra in its order.
+    pub(crate) fn of_shape(inputs: &SearchInputs, (shape, order): (Vec<Node>, Vec<u32>)) -> Self {
+        let (positions, tets) = (&inputs.mesh.positions, &inputs.mesh.tets);
+        let nodes = distinct_rows(shape.iter().map(|n| n.tets(&order).iter().flat_map(|&t| tets[t as usize])));
+        let (motion, now) = Motion::of(positions);
+        let volume = |at: usize| V::around(nodes.row(at).iter().map(|&n| positions[n as usize]));
         Self {
-            volumes: shape.iter().map(|n| V::for_points(&corners(n))).collect(),
-            boxes: vec![Extent::EMPTY; tets.len()],
+            volumes: (0..shape.len()).map(volume).collect(),
+            fitted: vec![now; shape.len()],
+            motion,
+            near: Indexed::new(UniformGrid::new(inputs.cell_mm, inputs.points), tets.len()),
+            nodes,
             shape,
             order,
         }
     }
 
-    /// Adds the pairs of a point below a node; returns how many did not fit.
-    fn descend(&self, at: u32, i: u32, p: Vec3, out: &mut Vec<[u32; 2]>) -> u32 {
-        let node = self.shape[at as usize];
-        if !self.volumes[at as usize].holds(p) {
-            return 0;
+    /// Lists the tetrahedra below a node whose boxes meet the region.
+    fn descend(&mut self, at: usize, positions: &[Vec3], tets: &[[u32; 4]], region: &Extent) {
+        let (low, high) = (region.low.into(), region.high.into());
+        let margin_mm = self.motion.since(self.fitted[at]);
+        if !self.volumes[at].meets(low, high, margin_mm) {
+            return;
         }
+        if margin_mm > LOOSE * self.volumes[at].size_mm() {
+            let places = &self.motion.places;
+            self.volumes[at] = V::around(self.nodes.row(at).iter().map(|&n| places[n as usize]));
+            self.fitted[at] = self.motion.now();
+            if !self.volumes[at].meets(low, high, 0.0) {
+                return;
+            }
+        }
+        let node = self.shape[at];
         if node.right != 0 {
-            return self.descend(at + 1, i, p, out) + self.descend(node.right, i, p, out);
+            self.descend(at + 1, positions, tets, region);
+            return self.descend(node.right as usize, positions, tets, region);
         }
-        let met = node.tets(&self.order).iter().filter(|&&t| self.boxes[t as usize].contains(p));
-        met.map(|&t| push_bounded(out, [i, t])).sum()
+        for &t in node.tets(&self.order) {
+            self.near.offer(t, box_of(positions, &tets[t as usize]), region);
+        }
     }
 }
 
 /// The search by a tree of such volumes.
 pub(crate) fn search<V: Volume + 'static>(inputs: &SearchInputs) -> Box<dyn Search> {
-    Box::new(Phased::new(VolumeTree::<V>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+    Box::new(Phased::new(VolumeTree::<V>::new(inputs), inputs.points))
 }
 
 impl<V: Volume> BroadPhase for VolumeTree<V> {
-    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], _region: &Aabb) {
-        for (fitted, tet) in self.boxes.iter_mut().zip(tets) {
-            *fitted = box_of(positions, tet);
-        }
-        for at in (0..self.shape.len()).rev() {
-            let node = self.shape[at];
-            let mut volume = self.volumes[at];
-            volume.clear();
-            if node.right == 0 {
-                for &t in node.tets(&self.order) {
-                    if self.boxes[t as usize] != Extent::EMPTY {
-                        volume.add_corners(&tets[t as usize].map(|c| positions[c as usize]));
-                    }
-                }
-            } else {
-                volume.add_child(&self.volumes[at + 1]);
-                volume.add_child(&self.volumes[node.right as usize]);
-            }
-            self.volumes[at] = volume;
-        }
+    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
+        self.motion.follow(positions);
+        self.near.clear();
+        self.descend(0, positions, tets, &Extent::from(*region));
+        self.near.sort();
     }
 
     fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
-        out.clear();
-        let overflow = (0..).zip(points).map(|(i, &p)| self.descend(0, i, p, out)).sum();
-        out.sort_unstable_by_key(|&[point, tet]| (tet, point));
-        overflow
+        self.near.pairs(points, out)
     }
 }
 
