@@ -109,7 +109,8 @@ pub fn ct(scope: Scope, findings: &mut Findings) {
     let other = image(&case_head().mri);
     let trials = scope.pick(1, 20);
     let tally = Tally::of(&ct, &other, trials, scope);
-    findings.gates.push(Gate::at_least("moves of another patient's MRI refused", tally.refused, trials as f64));
+    let share = 100.0 * tally.refused / trials as f64;
+    findings.gates.push(Gate::at_least("moves of another patient's MRI refused, percent", share, 100.0));
     findings.rows.push(tally.row("CT and another patient's MRI", trials));
 }
 
