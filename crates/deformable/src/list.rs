@@ -4,8 +4,8 @@ use crate::method::{Descriptor, Method, Response};
 use crate::response::{Ball, Respond, Spring};
 use crate::rivals::parry_tree;
 use crate::rivals::printed::Faces;
-use crate::rivals::{aabb, brute, hashed_grid, hybrid_tree, k_dop, kd_tree};
-use crate::rivals::{obb, octree, sphere, thesis, uniform_grid};
+use crate::rivals::{aabb, bottom_up_tree, brute, bsp_tree, hashed_grid, hybrid_tree, image_space, interest_matrix};
+use crate::rivals::{k_dop, kd_tree, obb, octree, sphere, stochastic, surface_boxes, thesis, uniform_grid};
 use crate::search::walk;
 
 /// All of them, the oracle first.
@@ -16,12 +16,18 @@ const METHODS: &[Descriptor] = &[
     hashed_grid::METHOD,
     octree::METHOD,
     kd_tree::METHOD,
+    bsp_tree::METHOD,
     aabb::METHOD,
     sphere::METHOD,
     k_dop::METHOD,
     obb::METHOD,
+    bottom_up_tree::METHOD,
     hybrid_tree::METHOD,
     parry_tree::METHOD,
+    interest_matrix::METHOD,
+    surface_boxes::METHOD,
+    image_space::METHOD,
+    stochastic::METHOD,
     thesis::METHOD,
     walk::METHOD,
 ];

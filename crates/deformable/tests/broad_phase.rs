@@ -21,6 +21,8 @@ fn all(mesh: &TetMesh, cell_mm: f32, points: usize) -> Vec<(&'static str, Box<dy
         ("ball tree", Box::new(VolumeTree::<Sphere>::new(&inputs))),
         ("k-DOP tree", Box::new(VolumeTree::<KDop>::new(&inputs))),
         ("turned box tree", Box::new(VolumeTree::<Obb>::new(&inputs))),
+        ("BSP tree", Box::new(Indexed::new(BspTree::new(points), tets))),
+        ("interest matrix", Box::new(InterestMatrix::new(&inputs))),
         ("hybrid tree", Box::new(HybridTree::new(&mesh.positions, &mesh.tets))),
         ("parry", Box::new(ParryTree::new(&inputs))),
     ]

@@ -5,4 +5,6 @@ mod flood;
 mod lost;
 pub mod walk;
 
+pub(crate) use flood::Flood;
+pub(crate) use lost::Lost;
 pub(crate) use walk::Walk;
