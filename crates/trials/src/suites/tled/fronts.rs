@@ -97,7 +97,7 @@ fn continuum(across: usize, findings: &mut Findings) -> (Vec3, f64) {
     findings.gates.push(Gate::at_most(
         "hanging block, truth: two meshes of quadratic tetrahedra apart, percent",
         apart,
-        if across < 8 { 5.0 } else { 3.0 },
+        3.0,
     ));
     found[1]
 }
