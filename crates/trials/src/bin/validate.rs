@@ -362,9 +362,8 @@ fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
     Ok(report.passed())
 }
 
-/// Writes the page of every report in the folder, and one more of each report that has lines over
-/// frames; returns whether every method of every family is
-/// in it.
+/// Writes the page of every report in the folder; returns whether every method of every family is
+/// in it. A report with lines over frames gets a page of its own besides.
 fn paged(out: &Path) -> Result<bool> {
     let mut reports = Vec::new();
     for suite in ALL.iter().chain(ON_REQUEST) {

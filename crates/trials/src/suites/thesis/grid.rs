@@ -43,7 +43,7 @@ const SPRING: f32 = 0.02;
 const DAMPER: f32 = 0.01;
 /// Cells for an object by Garcia-Alonso et al.: 512, so 8 for each axis.
 const CELLS_OF_OBJECT: f64 = 8.0;
-/// Constant times the edge, which Gregory et al. leave open: the one that fits the thesis's spheres.
+/// Constant times the edge, left open by Gregory et al.: the one that fits the thesis's spheres.
 const EDGES: f64 = 1.45;
 /// Why sizes differ.
 const PRICES: &str = "the best size follows from the prices of visits and tests on a machine";
