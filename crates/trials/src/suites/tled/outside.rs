@@ -1,5 +1,5 @@
-//! A ball pressed into a block and into the built-in brain, and slid: TLED on meshes of several
-//! sizes against an implicit code of other elements, other unknowns and another language.
+//! Judges TLED against an independent implicit code: a ball pressed into a block and into the
+//! built-in brain, and slid.
 //!
 //! # Theory
 //! The body is fixed below and free above. The ball presses places of the surface along one normal
@@ -35,7 +35,7 @@ use trepan_volume::{DistanceField, Grid, Interpolation, VoxelVolume, largest_com
 const LOOK_MM: f32 = 15.0;
 const LOOKS: u32 = 60;
 /// Way of the slide, mm.
-const SLIDE_MM: f32 = 10.0;
+const SLIDE_MM: f32 = 5.0;
 /// Radius and depth of the ball, mm.
 const BALL_MM: [f32; 2] = [5.0, 5.0];
 /// Error that the size of the preset `usual` must keep, percent: this project's goal.
@@ -84,6 +84,8 @@ pub struct Size {
     pub count: usize,
     /// Halvings of the brain's edges under the ball.
     pub halvings: u32,
+    /// Whether it is for the truth: small elements around the ball's end, not around its beginning.
+    pub of_truth: bool,
 }
 
 impl Brain {
@@ -109,6 +111,14 @@ fn onto(field: &DistanceField, place: Vec3, normal: Vec3) -> Vec3 {
     (0..8).fold(place, |p, _| p - field.sample(p) * normal)
 }
 
+/// Where a share of 0 to 1 lies between 0 and `end`, crowded around `fine`, mm.
+fn crowded(share: f32, fine: f32, end: f32) -> f32 {
+    let zero = (fine / end).sqrt() / ((fine / end).sqrt() + (1.0 - fine / end).sqrt());
+    let away = share - zero;
+    let (far, reach) = if away < 0.0 { (-fine, zero) } else { (end - fine, 1.0 - zero) };
+    if reach > 0.0 { fine + far * (away / reach).powi(2) } else { fine }
+}
+
 impl Shape {
     /// The name of the scene.
     fn name(&self, slid: bool) -> String {
@@ -119,26 +129,33 @@ impl Shape {
     /// Makes a mesh with the ball at the beginning or the end of the slide.
     pub fn pressed(&self, size: Size, slid: bool) -> Result<Pressed> {
         let [radius_mm, depth_mm] = BALL_MM;
+        let slid_mm = if slid { SLIDE_MM } else { 0.0 };
+        let Size { count, halvings, of_truth } = size;
         let (mesh, fixed, middle, normal) = match self {
             Self::Block => {
-                let n = size.count;
-                let cells = [n, n, n * 6 / 10];
+                let middle = Vec3::new(50.0 + slid_mm, 50.0, 60.0);
                 // Two ways to cut cells, so that the truth's mesh is not that of the judged ones.
-                let boxes = if size.halvings == 0 { boxes::centred_box } else { boxes::split_box };
-                let mut mesh = boxes(cells, Vec3::ONE);
-                let crowd = |x: f32| 50.0 + 50.0 * (2.0 * x - 1.0) * (2.0 * x - 1.0).abs().sqrt();
-                let map = |p: &Vec3| Vec3::new(crowd(p.x), crowd(p.y), 60.0 * (1.0 - (1.0 - p.z).powf(1.5)));
-                mesh.positions.iter_mut().for_each(|p| *p = map(p));
+                let boxes = if of_truth { boxes::split_box } else { boxes::centred_box };
+                let mut mesh = boxes([count, count, count * 6 / 10], Vec3::ONE);
+                let fine = if of_truth { middle } else { Vec3::new(50.0, 50.0, 60.0) };
+                mesh.positions.iter_mut().for_each(|p| {
+                    *p = Vec3::from_array([0, 1, 2].map(|k| crowded(p[k], fine[k], [100.0, 100.0, 60.0][k])))
+                });
                 let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
-                let middle = Vec3::new(50.0 + if slid { SLIDE_MM } else { 0.0 }, 50.0, 60.0);
                 (mesh, fixed, middle, Vec3::Z)
             }
             Self::Brain(brain) => {
-                let fineness = Fineness::stepped(size.count, size.halvings);
-                let mesh = brain.mesh(size.count, fineness.fine(brain.place, brain.normal))?;
+                let aside = brain.normal.any_orthonormal_vector() * slid_mm;
+                let middle = onto(&brain.field, brain.place + aside, brain.normal);
+                let stepped = Fineness::stepped(count, halvings);
+                let fine = if of_truth {
+                    Fineness { radius_mm: 13.0, above_mm: 5.0, ..stepped }.fine(middle, brain.normal)
+                } else {
+                    stepped.fine(brain.place, brain.normal)
+                };
+                let mesh = brain.mesh(count, fine)?;
                 let fixed = fixed_nodes(&mesh);
-                let aside = brain.normal.any_orthonormal_vector() * if slid { SLIDE_MM } else { 0.0 };
-                (mesh, fixed, onto(&brain.field, brain.place + aside, brain.normal), brain.normal)
+                (mesh, fixed, middle, brain.normal)
             }
         };
         let surface = Surroundings::of(&mesh, middle)?;
@@ -210,7 +227,7 @@ pub fn parts() -> Vec<Part> {
 /// Meshes of TLED: those of presets, and finer ones in a full run. The first is that of `usual`.
 fn sizes(shape: &Shape, scope: Scope) -> &'static [Size] {
     const fn of(count: usize, halvings: u32) -> Size {
-        Size { count, halvings }
+        Size { count, halvings, of_truth: false }
     }
     const BLOCK: [Size; 3] = [of(12, 0), of(8, 0), of(20, 0)];
     const BRAIN: [Size; 4] = [of(8_000, 4), of(3_000, 0), of(8_000, 0), of(20_000, 4)];
@@ -289,11 +306,13 @@ fn step(pressed: &Pressed, averaged_pressure: bool, truth: &Solution) -> Result<
     Ok((force_n, [truth.error_percent(moved), 100.0 * (force_n / truth.force_n - 1.0).abs()]))
 }
 
-/// Meshes of the truth for a scene: coarser, finer. Halvings of a block only choose its cells.
-const TRUTH_SIZES: [[Size; 2]; 2] = [
-    [Size { count: 10, halvings: 1 }, Size { count: 14, halvings: 1 }],
-    [Size { count: 4_000, halvings: 2 }, Size { count: 7_000, halvings: 3 }],
-];
+/// Meshes of the truth for block and brain: coarser, finer.
+const TRUTH_SIZES: [[Size; 2]; 2] = {
+    const fn of(count: usize, halvings: u32) -> Size {
+        Size { count, halvings, of_truth: true }
+    }
+    [[of(10, 0), of(14, 0)], [of(4_000, 3), of(9_000, 3)]]
+};
 
 /// A scene for `press.py`, by the name of its file.
 pub struct Export {
