@@ -74,8 +74,15 @@ struct Bite {
     loss_hu: f32,
 }
 
-/// A voxel that is worn, and its share of the wear, which has no unit.
-pub(crate) type Worn = (IVec3, f32);
+/// A voxel that is worn by density.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Worn {
+    pub voxel: IVec3,
+    /// Its share of the wear, in any unit.
+    pub share: f32,
+    /// The density that it keeps, HU.
+    pub floor_hu: f32,
+}
 
 /// The cutting side of one tool.
 pub(crate) struct Burr {
@@ -260,7 +267,7 @@ impl Burr {
         (self.paused, self.forward) = (0, (cut.device - cut.proxy).normalize_or_zero());
         let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
         out.spindle_rpm = rpm;
-        let shares: f32 = worn.iter().map(|worn| worn.1).sum();
+        let shares: f32 = worn.iter().map(|worn| worn.share).sum();
         if earned <= 0.0 || shares <= 0.0 {
             return;
         }
@@ -272,13 +279,13 @@ impl Burr {
         let price = |hu: f32| self.law.price(hu.max(least));
         let cost_mm3 = |from: f32, loss: f32| whole * (price(from) - price(from - loss));
         let mut spent_mm3 = 0.0;
-        for &(voxel, share) in worn.iter().take(self.limit) {
+        for &Worn { voxel, share, floor_hu } in worn.iter().take(self.limit) {
             let hu = f32::from(bone.ct(voxel));
             let loss_hu = (self.earned_mm3 * share / (shares * cost_mm3(hu, 1.0).max(1e-9))).floor();
-            let loss_hu = loss_hu.min(hu - f32::from(AIR_HU));
+            let loss_hu = loss_hu.min((hu - floor_hu).floor());
             if loss_hu >= 1.0 {
                 spent_mm3 += cost_mm3(hu, loss_hu);
-                self.bites.push(Bite { voxel, floor_hu: f32::from(AIR_HU), loss_hu });
+                self.bites.push(Bite { voxel, floor_hu, loss_hu });
             }
         }
         // Bone that is used up earns nothing for later.

@@ -1,5 +1,5 @@
-//! Burr and shaft by their distance from voxels, with torque, damping and friction: a ball and a
-//! cylinder against voxel centres that a tree of boxes finds.
+//! Burr and shaft by their distance from voxels that a tree of boxes finds, with damping, friction
+//! and torque.
 //!
 //! # Theory
 //! A voxel of bone of edge s touches the burr when it is nearer to the burr's centre than the
@@ -7,7 +7,7 @@
 //! the two
 //! ```text
 //! n = Σ dᵢ nᵢ / |Σ dᵢ nᵢ| ,   d = max dᵢ ,   x = Σ dᵢ xᵢ / Σ dᵢ
-//! dᵢ = radius + s/2 - distance,   nᵢ from the voxel's centre to centre or axis
+//! dᵢ = radius + ⅜ s - distance,   nᵢ from the voxel's centre to centre or axis
 //! Fₙ = k (d n)₁ + k (d n)₂ ,   τ = (x₂ - tip) × k (d n)₂
 //! F = max(0, |Fₙ| - b v·n) n - μ |Fₙ| vₜ / max(|vₜ|, v₀)      v: velocity of the tip
 //! ```
@@ -22,9 +22,9 @@
 //! X. He, Y. Chen, *Bone drilling simulation based on six degree-of-freedom haptic rendering*,
 //! EuroHaptics 2006: not read. Ball and cylinder, distances of voxels, the OBB tree of the
 //! volumetric model, elastic and frictional forces with springs and dampers, torque: as the thesis
-//! tells it (1.2 and 2.3.1). Liberties: how the voxels' distances become one force; voxels as
-//! balls of half an edge, without which bone begins half a voxel late; leaves of the tree are bricks
-//! of 8³ voxels; b and μ, which the thesis does not give.
+//! tells it (1.2 and 2.3.1). Liberties: how the voxels' distances become one force; voxels as balls
+//! of ⅜ of an edge, without which bone begins as much later; leaves of the tree are bricks of
+//! 8³ voxels; b and μ, which the thesis does not give.
 //!
 //! # When not to use it
 //! For a steady force: depth is counted from voxel centres, so that it steps by fractions of a
@@ -48,8 +48,9 @@ const STIFFNESS: f32 = 2.0;
 /// Speed v₀ under which friction is a damper, mm/ms.
 const SLOW: f32 = 0.02;
 
-/// Radius of a voxel, voxels.
-const VOXEL: f32 = 0.5;
+/// How far the deepest voxel's centre is under a flat wall, as a mean over its directions and
+/// places, voxels.
+const VOXEL: f32 = 0.375;
 
 /// What the force has beside its springs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -225,7 +226,8 @@ mod tests {
     use super::*;
     use trepan_volume::VoxelVolume;
 
-    /// The force over k of a ball of 2 mm that goes `way` mm in a ms and is then 0.6 mm in flat bone.
+    /// The force over k of a ball of 2 mm that goes `way` mm in a ms and is then 0.6 mm in flat
+    /// bone.
     fn felt(config: Config, way: Vec3) -> Vec3 {
         let mut ct = VoxelVolume::isotropic([24; 3], Vec3::splat(-5.75), 0.5, 0i16);
         let place = |at: usize| -5.75 + 0.5 * (at / 576) as f32;

@@ -15,8 +15,8 @@
 //!
 //! # Practice
 //! The normal of the contact is the mean of the points' pushes, its depth that of the deepest point
-//! along it (Hooke's law is the caller's). 466 points, six looks at each voxel at the surface. World
-//! mm. On a flat wall the depth is the wall's, so that no gain is needed.
+//! along it (Hooke's law is the caller's). 466 points, six looks at each voxel at the surface.
+//! World mm. On a flat wall the depth is the wall's, so that no gain is needed.
 //!
 //! # Sources
 //! E. Acosta, A. Liu, *Real-time volumetric haptic and visual burrhole simulation*, IEEE VR 2007:
@@ -24,8 +24,8 @@
 //! capabilities of tools, forces outside of the haptic loop and interpolated); E. Acosta et al.,
 //! Stud. Health Technol. Inform. 125 (2007). Steps along the normal, voxels with density, gradient
 //! and colour, planes by exposed facets, erosion points, Hooke's law: as the thesis tells it
-//! (2.3.1). Liberties: a voxel is at the surface where a face is bare, since the gradient of a CT is
-//! zero nowhere; how faces and gradient become one plane; volume eroded by this crate's
+//! (2.3.1). Liberties: a voxel is at the surface where a face is bare, since the gradient of a CT
+//! is zero nowhere; how faces and gradient become one plane; volume eroded by this crate's
 //! [`RemovalLaw`], that burrs of all methods earn alike; forces in every tick, not interpolated.
 //!
 //! # When not to use it
@@ -42,7 +42,7 @@ use crate::surface::NEIGHBOURS;
 use glam::IVec3;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
-use trepan_volume::BoneVolume;
+use trepan_volume::{AIR_HU, BoneVolume};
 
 struct Faces {
     shell: Shell,
@@ -92,7 +92,7 @@ impl PenaltyProbe for Faces {
             if !bone.is_bone(near.voxel) {
                 return;
             }
-            self.worn.push((near.voxel, 1.0));
+            self.worn.push(Worn { voxel: near.voxel, share: 1.0, floor_hu: AIR_HU.into() });
             let found = plane(bone, tool.tip_radius_mm, near.point, near.inward, &mut out.voxels_swept);
             if let Some((depth_mm, normal)) = found.filter(|&(depth_mm, _)| depth_mm > 0.0) {
                 self.pushes.push(Contact { point: near.point, normal, depth_mm }, out);

@@ -1,5 +1,5 @@
-//! The voxmap pointshell: points of a tool are pushed out of bone voxels by their depth under each
-//! voxel's tangent plane, and the hand holds the tool by a virtual coupling.
+//! The voxmap pointshell: tangent planes of bone voxels push a tool's points, and the hand holds
+//! the tool by a virtual coupling.
 //!
 //! # Theory
 //! The tangent plane of a point passes through the centre of its voxel, with the point's own inward
@@ -31,10 +31,10 @@
 //! force with less voxel noise, a virtual coupling); the average as the thesis tells it (3.4.3).
 //!
 //! Liberties, each in the method's favour: the orientation is the hand's, contacts turn nothing but
-//! the hand; a tool in free space is where the hand is, so that its mass is not felt; braking bounds
-//! the speed instead of adding a force for each point; every voxel of bone has a tangent plane, not
-//! the surface's layer only; points stand out by half a voxel, since voxels whose centre is bone
-//! begin half a voxel later than those that a surface passes through.
+//! the hand; a tool in free space is where the hand is, so that its mass is not felt; braking
+//! bounds the speed instead of adding a force for each point; every voxel of bone has a tangent
+//! plane, not the surface's layer only; points stand out by half a voxel, since voxels whose centre
+//! is bone begin half a voxel later than those that a surface passes through.
 //!
 //! # When not to use it
 //! Against thin walls and strong hands: the layer that pushes is half a voxel deep.
@@ -114,7 +114,7 @@ impl Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { combine: Combine::Average, point_stiffness: 1.5, ..Self::SUM }
+        Self { combine: Combine::Average, point_stiffness: 1.25, ..Self::SUM }
     }
 }
 

@@ -6,8 +6,8 @@
 //! box meets has ever held bone.
 //!
 //! # Practice
-//! World mm. 466 points on a ball of 3 mm over 0.5 mm voxels: 0.3 us in the air, 0.6 us on bone
-//! before its voxels are looked at.
+//! World mm. Of 466 points on a ball of 3 mm that touches flat bone in voxels of 0.5 mm, about half
+//! are looked at.
 
 use crate::eight::Vec3x8;
 use glam::{IVec3, Mat3};

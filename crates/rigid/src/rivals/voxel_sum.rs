@@ -17,18 +17,20 @@
 //! carries the burr and is never worn.
 //!
 //! # Practice
-//! Voxels count by fraction, ½ + (hu - iso)/1000, and as balls of a voxel's size. Rows of eight
-//! voxels in one go; rows in bricks that never held bone cost nothing. Smooth, since it is a sum.
+//! Voxels count by fraction, ½ + (hu - iso)/1000, and as balls of a voxel's size. Burr and bone
+//! come into a voxel from opposite sides, so that their overlap in it is what is too much for it:
+//! `max(0, bone + burr - 1)`. Wear takes that and leaves the rest. Rows of eight voxels in one go;
+//! rows in bricks that never held bone cost nothing. Smooth, since it is a sum.
 //!
 //! # Sources
 //! M. Agus et al., *Real-time haptic and visual simulation of bone dissection*, IEEE VR 2002 and
-//! Presence 12 (2003): abstracts read (physically motivated burr-bone interaction, erosion, voxels);
-//! voxels as balls of the same volume, elastic forces first, then an energy balance of the motor's
-//! work and the energy to cut: as the thesis tells it (2.3.1); Hertz's exponent, pressure and depth
-//! by volume from memory of section 3, without its numbers. Liberties: all voxels in the ball, not
-//! 5³ samples of it; C by the closed form above; the friction that pulls a spinning burr aside is
-//! left out, since no truth here has it; power by this crate's [`RemovalLaw`], which is such a
-//! balance; a by the overlap; the burr's own axis makes no difference.
+//! Presence 12 (2003): abstracts read (physically motivated burr-bone interaction, erosion,
+//! voxels); voxels as balls of the same volume, elastic forces first, then an energy balance of the
+//! motor's work and the energy to cut: as the thesis tells it (2.3.1); Hertz's exponent, pressure
+//! and depth by volume from memory of section 3, without its numbers. Liberties: all voxels in the
+//! ball, not 5³ samples of it; C by the closed form above; the friction that pulls a spinning burr
+//! aside is left out, since no truth here has it; power by this crate's [`RemovalLaw`], which is
+//! such a balance; a by the overlap; the burr's own axis makes no difference.
 //!
 //! # When not to use it
 //! Where forces should grow in proportion to depth: stiffness at the reference depth is 1.5 k, at
@@ -48,8 +50,10 @@ use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::{BRICK, BoneVolume};
 use wide::f32x8;
 
-/// Density under the isovalue down to which a voxel is partly bone, HU.
+/// Density over and under the isovalue within which a voxel is partly bone, HU.
 const HALF_HU: f32 = 500.0;
+/// Share of a voxel for each HU.
+const PER_HU: f32 = 0.5 / HALF_HU;
 /// Most voxels that are read in one go.
 const ROW: usize = 32;
 /// Most voxels that a burr wears at once.
@@ -104,12 +108,12 @@ fn overlap(bone: &BoneVolume, centre: Vec3, radius: f32) -> Overlap {
             row[count..count.next_multiple_of(8)].fill(i16::MIN);
             for (eight, hu) in row[..count.next_multiple_of(8)].as_chunks().0.iter().enumerate() {
                 let x = lanes + ((at.x + 8 * eight as i32) as f32 - centre.x);
-                let share = ((wide(hu) - border) * 1e-3).fast_max(zero).fast_min(one);
+                let share = ((wide(hu) - border) * PER_HU).fast_max(zero).fast_min(one);
                 if share.simd_gt(zero).to_bitmask() == 0 {
                     continue;
                 }
                 let inside = (f32x8::splat(radius + 0.5) - (x * x + away).sqrt()).fast_max(zero).fast_min(one);
-                let within = share * inside;
+                let within = (share + inside - one).fast_max(zero);
                 *volume += within;
                 *x_sum += within * x;
                 *y_sum += within * y;
@@ -142,23 +146,26 @@ impl PenaltyProbe for Sum {
     }
 
     fn wears(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, felt: &Felt) -> Option<&[Worn]> {
-        let (centre, radius) = (bone.grid_of(pose.translation), tool.tip_radius_mm / bone.spacing_mm());
-        let (worn, least) = (&mut self.worn, f32::from(bone.isovalue()) - HALF_HU);
+        let (centre, spacing, worn) = (bone.grid_of(pose.translation), bone.spacing_mm(), &mut self.worn);
+        let radius = tool.tip_radius_mm / spacing + 0.5;
+        let aside = |voxel: IVec3| (voxel.as_vec3() - centre).reject_from_normalized(felt.normal).length_squared();
+        let mut widest = 0.0f32;
         worn.clear();
-        let (reach, normal) = (radius + 0.5, felt.normal);
-        rows(GridBall { centre, radius: reach }, GridBall::NONE, |start, to| {
+        rows(GridBall { centre, radius }, GridBall::NONE, |start, to| {
             for voxel in (start.x..=to).map(|x| start.with_x(x)) {
-                if worn.len() < MAX_WORN && f32::from(bone.hu(voxel)) > least {
-                    worn.push((voxel, (voxel.as_vec3() - centre).reject_from_normalized(normal).length_squared()));
+                // What is within the ball goes, what is left of the voxel stays.
+                let inside = (radius - voxel.as_vec3().distance(centre)).clamp(0.0, 1.0);
+                let floor_hu = f32::from(bone.isovalue()) + HALF_HU - inside / PER_HU;
+                let over = f32::from(bone.hu(voxel)) - floor_hu;
+                if over >= 1.0 && worn.len() < MAX_WORN {
+                    widest = widest.max(aside(voxel));
+                    worn.push(Worn { voxel, share: (over * PER_HU).min(1.0), floor_hu });
                 }
             }
         });
         // Half a voxel beyond the outermost, so that it is worn too.
-        let disc = (worn.iter().map(|worn| worn.1).fold(0.0, f32::max).sqrt() + 0.5).powi(2);
-        for (voxel, share) in worn.iter_mut() {
-            let overlap = (reach - voxel.as_vec3().distance(centre)).clamp(0.0, 1.0);
-            *share = overlap * (1.0 - *share / disc).sqrt();
-        }
+        let disc = (widest.sqrt() + 0.5).powi(2);
+        worn.iter_mut().for_each(|worn| worn.share *= (1.0 - aside(worn.voxel) / disc).sqrt());
         Some(worn)
     }
 }

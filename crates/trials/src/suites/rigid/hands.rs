@@ -14,8 +14,10 @@
 //! The first does not punish a method for where it went before, the second does.
 //!
 //! # Practice
-//! Voxels are those that the default quality takes of this head. Burrs have a radius of 1, 2 and 4
-//! mm. A hand that a method lets fall through the skull has an error of millimetres.
+//! Voxels are those that the default quality takes of this head. Burrs have a radius of 1 to 4 mm:
+//! 2 to 6 mm across, as temporal-bone simulators have them, and 8. Rivals are as stiff as the
+//! spring k at 0.5 mm (`rivals`), led and compliant. A hand that a method lets fall through the
+//! skull has an error of millimetres.
 
 use super::bones::{SKULLS, head, skull};
 use super::{STIFFNESS, worst_chart};
@@ -40,7 +42,7 @@ const SLIDE_MM: f64 = 4.0;
 /// Time to come down, to stay, to slide, ms: of a quick run and of a full one.
 const TIMES_MS: [[usize; 3]; 2] = [[200, 200, 300], [300, 500, 500]];
 /// Radii of burrs, mm.
-const BURRS_MM: [f32; 3] = [1.0, 2.0, 4.0];
+const BURRS_MM: [f32; 4] = [1.0, 2.0, 3.0, 4.0];
 /// Edge of a voxel, mm.
 const VOXEL_MM: f32 = 0.5;
 /// Half an edge of the piece of the head that is touched, mm.

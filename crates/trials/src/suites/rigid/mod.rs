@@ -17,6 +17,7 @@ mod order;
 mod published;
 pub(super) mod recording;
 mod removal;
+mod rivals;
 mod soak;
 pub(super) mod solid;
 mod walls;
@@ -45,6 +46,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.extend(walls::parts(scope));
     parts.extend(coupling::parts());
     parts.extend(energy::parts());
+    parts.extend(rivals::parts());
     parts
 }
 
@@ -55,6 +57,7 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     order::judge(findings);
     hands::judge(findings);
     removal::judge(findings);
+    rivals::judge(findings);
 }
 
 /// A group's chart with each method's worst cost and worst error over the group's scenes. `gated`
