@@ -5,6 +5,7 @@ mod device;
 mod fronts;
 mod locking;
 mod motion;
+mod published;
 mod region;
 mod rivals;
 mod slender;
@@ -28,8 +29,9 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// The charts and maps of what was found.
+/// The charts, maps and tables of what was found.
 pub fn judge(_: Scope, findings: &mut Findings) {
     locking::draw(findings);
     stability::draw(findings);
+    findings.tables.extend(published::tables(&findings.rows));
 }
