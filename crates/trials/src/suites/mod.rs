@@ -2,6 +2,7 @@
 
 mod ablation;
 pub mod budget;
+mod claims;
 mod conditions;
 pub mod deformable;
 pub mod families;

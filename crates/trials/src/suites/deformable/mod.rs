@@ -50,9 +50,10 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// Adds the gate over all random poses.
+/// Adds the gate over all random poses, and the tables of rivals.
 pub fn judge(_: Scope, findings: &mut Findings) {
     poses::judge(findings);
+    findings.tables.extend(published::tables(&findings.rows));
 }
 
 /// All methods but the oracle, which is the reference and too slow to be rated.

@@ -22,7 +22,7 @@ use crate::engine::suite::Findings;
 use crate::suites::voxel_size::pass::HashedGrid;
 use crate::suites::voxel_size::scene::{Body, Elements, Scene, Touch, mesh};
 use crate::suites::voxel_size::timing::Calibration;
-use crate::suites::voxel_size::{TABLE, chosen_mm, ladder, share_without_contact, thesis_mm, zone};
+use crate::suites::voxel_size::{TABLE, chosen, edge_of_512_voxels, ladder, share_without_contact, thesis_mm, zone};
 use crate::suites::{Part, Scope};
 use glam::DVec3;
 use std::time::Instant;
@@ -41,8 +41,6 @@ const STEP_MS: f32 = 0.5;
 /// Spring on a node inside the other body, N/mm, and its damper, N ms/mm.
 const SPRING: f32 = 0.02;
 const DAMPER: f32 = 0.01;
-/// Cells for an object by Garcia-Alonso et al.: 512, so 8 for each axis.
-const CELLS_OF_OBJECT: f64 = 8.0;
 /// Constant times the edge, left open by Gregory et al.: the one that fits the thesis's spheres.
 const EDGES: f64 = 1.45;
 /// Why sizes differ.
@@ -183,8 +181,8 @@ fn measured(scene: &Scene, frames: &[Frame], rounds: usize) -> Measured {
     let reach_mm = 1.001 * ladder_mm[ladder_mm.len() - 1];
     let expected = Expected::of(&scene.boxes, &scene.particles, reach_mm).expect("the scene is finite");
     let mut calibration = Calibration::of(scene, usual_mm);
-    let [ours, _] = chosen_mm(&mut calibration, &expected, ladder_mm[0]).unwrap_or([usual_mm; 2]);
-    let of_object = f64::from(scene.size_mm.max_element()) / CELLS_OF_OBJECT;
+    let ours = chosen(&mut calibration, &expected, ladder_mm[0]).map_or(usual_mm, |chosen| chosen.ours);
+    let of_object = edge_of_512_voxels(&scene.boxes);
     let sizes_mm = [ours, thesis_mm(scene), usual_mm, of_object, EDGES * usual_mm];
     let cells_mm: Vec<f64> = ladder_mm.iter().copied().chain(sizes_mm).collect();
     let times_us = times_us(frames, &cells_mm, rounds);

@@ -6,6 +6,7 @@ mod fronts;
 mod locking;
 mod motion;
 pub mod outside;
+mod published;
 mod region;
 mod rivals;
 mod slender;
@@ -30,8 +31,9 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// The charts and maps of what was found.
+/// The charts, maps and tables of what was found.
 pub fn judge(_: Scope, findings: &mut Findings) {
     locking::draw(findings);
     stability::draw(findings);
+    findings.tables.extend(published::tables(&findings.rows));
 }

@@ -1,7 +1,7 @@
 //! Runs scenes that no rule was made for. Rows give each rule's size, whether a grid of that size
 //! can be built, and whether it is near the best.
 
-use super::{OURS, RULES};
+use super::{OURS, RULES, edge_of_512_voxels, timing};
 use crate::engine::picture::Outcome;
 use crate::engine::suite::{Findings, Gate};
 use crate::suites::conditions;
@@ -12,6 +12,8 @@ use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
 const PRICES: Prices = Prices { fixed: 0.0, visit: 0.004, doubt: 0.006, test: 0.02 };
 /// The thesis's share of boxes that touch nothing.
 const NO_CONTACT: f64 = 0.99;
+/// Sizes that a tuned formula tries beside its first seven.
+const CANDIDATES: usize = 9;
 /// Work beyond that of the best size, by which a rule degrades, and fails.
 const DEGRADES: f64 = 1.3;
 const FAILS: f64 = 3.0;
@@ -69,10 +71,12 @@ fn verdict((boxes, particles): &Scene, rule: &str) -> Outcome {
                 Err(fault) => return Outcome::Refused(fault.to_string()),
             }
         }
-        "mean edge" => edges,
+        "mean edge" | "mean edge, tuned" => edges,
         "1.45 x mean edge" => 1.45 * edges,
+        "512 voxels" | "512 voxels, tuned" => edge_of_512_voxels(boxes),
         _ => {
-            let model = if rule == "thesis analytic" { Ok(CostModel::default()) } else { PRICES.model(NO_CONTACT) };
+            let model =
+                if rule.starts_with("thesis analytic") { Ok(CostModel::default()) } else { PRICES.model(NO_CONTACT) };
             let all = Measures {
                 elements: boxes.len(),
                 longest_edge_mm: edges,
@@ -86,14 +90,26 @@ fn verdict((boxes, particles): &Scene, rule: &str) -> Outcome {
             }
         }
     };
-    judged(boxes, particles, size, edges)
+    judged(boxes, particles, if rule.ends_with("tuned") { tuned_by_work(boxes, particles, size) } else { size }, edges)
+}
+
+/// The tuned size by counts of work in place of times; the formula's where a grid is refused.
+fn tuned_by_work(boxes: &[Aabb], particles: &[Vec3], formula_mm: f64) -> f64 {
+    let cheapest = |cells: &[f64]| {
+        let work: Vec<f64> = cells.iter().map(|cell| work(boxes, particles, *cell).unwrap_or(f64::INFINITY)).collect();
+        (0..cells.len()).min_by(|&a, &b| work[a].total_cmp(&work[b]))
+    };
+    timing::tuned(formula_mm, CANDIDATES, cheapest).unwrap_or(formula_mm)
+}
+
+/// Work of a pass at a size, µs.
+fn work(boxes: &[Aabb], particles: &[Vec3], size: f64) -> Result<f64, String> {
+    let found = counts::grid(boxes, particles, size).map_err(|fault| fault.to_string())?;
+    Ok(PRICES.visit * found.visits as f64 + PRICES.test * found.tests as f64)
 }
 
 fn judged(boxes: &[Aabb], particles: &[Vec3], size: f64, edges: f64) -> Outcome {
-    let at = |size: f64| match counts::grid(boxes, particles, size) {
-        Ok(found) => Ok(PRICES.visit * found.visits as f64 + PRICES.test * found.tests as f64),
-        Err(fault) => Err(fault.to_string()),
-    };
+    let at = |size: f64| work(boxes, particles, size);
     let own = match at(size) {
         Ok(work) => work,
         Err(fault) => return Outcome::Refused(fault),

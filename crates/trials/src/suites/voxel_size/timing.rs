@@ -24,6 +24,8 @@ const BLOCK: usize = 8;
 const AGREED: f64 = 0.01;
 /// Sizes that are timed for the prices, in mean edges.
 const CALIBRATION: [f64; 7] = [0.4, 0.6, 0.9, 1.3, 1.9, 2.8, 4.0];
+/// How far a tuned formula looks beyond the first constants when the outermost is best.
+const BEYOND: f64 = 4.0;
 /// Boxes that are timed for the prices; the others cost the same.
 const SAMPLE: usize = 3_000;
 /// Neighbouring boxes that are sampled together.
@@ -43,6 +45,34 @@ impl Least {
     pub fn apart(&self) -> f64 {
         self.choose.iter().zip(&self.judge).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
     }
+}
+
+/// The size of a formula times the constant that is cheapest, mm.
+///
+/// Tries seven constants, then as many sizes as this crate's rule, between the neighbours of the
+/// best. `cheapest` gives the number of the cheapest size.
+pub fn tuned(formula_mm: f64, candidates: usize, mut cheapest: impl FnMut(&[f64]) -> Option<usize>) -> Option<f64> {
+    let first = CALIBRATION.map(|constant| constant * formula_mm);
+    let best = cheapest(&first)?;
+    let low = if best == 0 { first[0] / BEYOND } else { first[best - 1] };
+    let high = if best + 1 == first.len() { first[best] * BEYOND } else { first[best + 1] };
+    let between = |n: usize| low * (high / low).powf((n + 1) as f64 / (candidates + 1) as f64);
+    let second: Vec<f64> = (0..candidates.max(1)).map(between).collect();
+    cheapest(&second).map(|n| second[n])
+}
+
+/// Number of the size with the cheapest pass over the scene, by the time that a calibration takes.
+pub fn cheapest(scene: &Scene, cells: &[f64]) -> Option<usize> {
+    let (mut grid, (least_ms, least_rounds)) = (HashedGrid::default(), CALIBRATION_MS);
+    let mut slices: Vec<Slices> = cells.iter().map(|_| Slices::default()).collect();
+    let (start, mut rounds) = (Instant::now(), 0);
+    while rounds < least_rounds || start.elapsed().as_secs_f64() * 1e3 < least_ms {
+        for (slices, cell) in slices.iter_mut().zip(cells) {
+            slices.pass(&mut grid, &scene.boxes, &scene.particles, *cell, DVec3::splat(0.37 * cell));
+        }
+        rounds += 1;
+    }
+    (0..cells.len()).min_by(|&a, &b| slices[a].sum_us().total_cmp(&slices[b].sum_us()))
 }
 
 /// Rounds over all sizes, so that a slow moment of the machine meets every size, until the halves
