@@ -12,6 +12,8 @@ use plotters::prelude::*;
 use std::ops::Range;
 
 const SIZE: (u32, u32) = (960, 300);
+/// Room for the legend right of the lines, as a share of their width.
+const LEGEND: f64 = 0.24;
 /// Width of the legend's sample of a line, px.
 const SAMPLE: i32 = 16;
 
@@ -26,6 +28,7 @@ pub fn svg(series: &Series) -> Result<String, Fault> {
         values.fold(f64::INFINITY..f64::NEG_INFINITY, |range, v| range.start.min(v)..range.end.max(v))
     };
     let x = span(&mut all().map(|point| point.0));
+    let wide = x.start..x.end + LEGEND * (x.end - x.start);
     let limit = series.limit.as_ref().map(|(value, _)| *value).filter(|value| is_drawn(*value));
     let y = span(&mut all().map(|point| point.1).chain(limit));
     if x.start >= x.end {
@@ -36,10 +39,10 @@ pub fn svg(series: &Series) -> Result<String, Fault> {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
         if series.logarithmic {
-            draw(series, &root, &x, (0.8 * y.start..1.4 * y.end).log_scale(), limit)?;
+            draw(series, &root, &wide, (0.8 * y.start..1.4 * y.end).log_scale(), limit)?;
         } else {
             let room = 0.06 * (y.end - y.start).max(1e-6);
-            draw(series, &root, &x, y.start - room..y.end + room, limit)?;
+            draw(series, &root, &wide, y.start - room..y.end + room, limit)?;
         }
         root.present()?;
     }
@@ -86,7 +89,7 @@ where
 
 /// Axis label of a value of either sign.
 fn signed(value: &f64) -> String {
-    if *value < 0.0 { format!("-{}", tick(&-value)) } else { tick(value) }
+    if *value < -1e-9 { format!("-{}", tick(&-value)) } else { tick(&value.max(0.0)) }
 }
 
 #[cfg(test)]

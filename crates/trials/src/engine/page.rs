@@ -155,8 +155,6 @@ mod tests {
                 columns: vec!["key".into(), "force, N".into()],
                 rows: vec![vec!["a=1".into(), "0.25".into()]],
             }],
-            series: vec![Series::over_frames("depth <p>", "mm", [("own".to_string(), &[0.5, 0.25][..])])],
-            pictures: vec![Snapshot { title: "seen".into(), png: "AAAA".into() }],
             conclusions: vec!["a=1 changes & costs".into()],
             regressions: vec!["WORSE: a map".into()],
             ..Findings::default()
@@ -169,6 +167,7 @@ mod tests {
             elsewhere: BTreeMap::new(),
             findings,
         };
+        let mut with_lines = report.clone();
         let page = html(&[(&suite, report)], &[(); 0]).unwrap();
         for part in [
             "is a &lt; b?",
@@ -186,13 +185,19 @@ mod tests {
             "<td>a=1</td><td>0.25</td>",
             "a=1 changes &amp; costs",
             "<td>known gap</td>",
-            "depth &lt;p&gt;",
-            "<img alt=\"seen\" src=\"data:image/png;base64,AAAA\">",
             "<circle",
         ] {
             assert!(page.contains(part), "{part} is missing in {page}");
         }
         assert_eq!(page.matches("class=\"row bad\"").count(), 2, "{page}");
         assert_eq!(page.matches("<summary>").count(), 1);
+        let line = [("own".to_string(), &[0.5, 0.25][..])];
+        with_lines.findings.series = vec![Series::over_frames("depth <p>", "mm", line)];
+        with_lines.findings.pictures = vec![Snapshot { title: "seen".into(), png: "AAAA".into() }];
+        let page = html(&[(&suite, with_lines)], &[(); 0]).unwrap();
+        for part in ["depth &lt;p&gt;", "<img alt=\"seen\" src=\"data:image/png;base64,AAAA\">", "<polyline"] {
+            assert!(page.contains(part), "{part} is missing");
+        }
+        assert!(!page.contains("<circle"), "lines replace the default chart");
     }
 }

@@ -84,11 +84,15 @@ struct Ride {
     forces: Vec<Vec3>,
 }
 
-/// Rides a path some times and keeps the least time of each frame.
+/// Rides a path some times and keeps the least time of each frame. Bone that was drilled is made
+/// anew.
 fn ride(method: &Method, model: &Model, path: &[ToolState], rounds: usize) -> Ride {
-    let mut kept = Ride::default();
-    for _ in 0..rounds {
-        let bone = model.bone();
+    let (mut kept, mut bone) = (Ride::default(), model.bone());
+    let drills = path.iter().any(|tool| tool.buttons.has(Buttons::PEDAL));
+    for round in 0..rounds {
+        if drills && round > 0 {
+            bone = model.bone();
+        }
         let ride = ride_once(method, &bone, path);
         let least = |kept: &[f64], new: &[f64]| match kept.is_empty() {
             true => new.to_vec(),
@@ -230,7 +234,7 @@ fn models_by_frame(
         for (path, rides) in paths.iter().zip(&mut all) {
             let (name, bone) = (model.name.clone(), model.bone());
             let voxels = bone.dims().iter().product::<usize>() as f64;
-            let of = METHODS.each_ref().map(|method| ride(method, &model, path, scope.pick(2, 3)));
+            let of = METHODS.each_ref().map(|method| ride(method, &model, path, scope.pick(4, 3)));
             rides.push(Ridden { name, voxels, edge_mm: bone.spacing_mm().into(), rides: of });
         }
     }

@@ -85,7 +85,7 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let measures = &scene.measures;
     let usual = measures.traditional_mm();
     let steps = LADDER.0;
-    let ladder = ladder(usual);
+    let ladder = ladder(usual, steps);
     let reach = ladder[steps - 1] * 1.001;
     let start = Instant::now();
     let expected = Expected::of(&scene.boxes, &scene.particles, reach).expect("the scene is finite");
@@ -143,9 +143,9 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// Cell edges that are timed, mm, for a usual one.
-pub fn ladder(usual_mm: f64) -> Vec<f64> {
-    let (steps, first, step) = LADDER;
+/// So many cell edges to time, mm, for a usual one.
+pub fn ladder(usual_mm: f64, steps: usize) -> Vec<f64> {
+    let (_, first, step) = LADDER;
     (0..steps).map(|i| usual_mm * first * step.powi(i as i32)).collect()
 }
 
