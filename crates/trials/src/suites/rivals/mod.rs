@@ -17,6 +17,10 @@
 //! time stands in the rows. Only TLED and scikit-fem's factorisation have threads: these run with
 //! two as well. MuJoCo, Newton on the processor and PyBullet have one.
 //!
+//! On one mesh all linear tetrahedra have the same rest, so that their errors hardly differ; only
+//! averaged nodal pressure and quadratic elements are nearer. Vertex block descent that has not
+//! converged sags further and can seem nearer than its mesh allows.
+//!
 //! Laws: MuJoCo has St. Venant-Kirchhoff and the stable neo-Hookean law, Newton and PyBullet the
 //! latter; scikit-fem that of TLED. At these strains they differ by some 2 % of the way.
 //!

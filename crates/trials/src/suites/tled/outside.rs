@@ -14,7 +14,7 @@
 //! The ball goes in no deeper than its radius. Further, and under a sharper probe, the rim shears
 //! the tissue without bound: no elastic model has an answer there, and none is asked for. The same
 //! holds for stress at the edge of a clamp, where every mesh gives another value; only force and
-//! displacement are judged. The meshes of TLED fill the brain's mask each in its own way, so that
+//! displacement are judged. The meshes of TLED fill the body's mask, each in its own way, so that
 //! the error holds what their shape lacks, too.
 
 use super::Scope;
@@ -22,7 +22,6 @@ use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use anyhow::{Context, Result};
 use serde::Deserialize;
-use std::sync::Arc;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_mesh::{TetMesh, lattice};
@@ -59,38 +58,38 @@ pub struct Pressed {
     pub ball: PressedBall,
 }
 
-/// What a mesh is made of.
-#[derive(Clone)]
-pub enum Shape {
-    /// 100x100x60 mm.
-    Block,
-    /// The built-in brain.
-    Brain(Arc<Brain>),
-}
-
-/// The brain's mask, ready to be filled.
-pub struct Brain {
+/// A body of brain tissue.
+pub struct Shape {
+    name: &'static str,
+    /// Its mask, ready to be filled.
     domain: lattice::Domain,
     field: DistanceField,
     /// Where the slide begins, and the normal there.
     place: Vec3,
     normal: Vec3,
+    /// Direction of the slide, a unit vector.
+    along: Vec3,
+    /// Size of the block, mm; none for the brain.
+    block_mm: Option<Vec3>,
 }
 
 /// Size of a mesh.
 #[derive(Clone, Copy)]
 pub struct Size {
-    /// Cells across the block, or tetrahedra of the brain.
+    /// Tetrahedra of the whole body; cells across the truth's block.
     pub count: usize,
-    /// Halvings of the brain's edges under the ball.
+    /// Halvings of the edges under the ball.
     pub halvings: u32,
     /// Whether it is for the truth: small elements around the ball's end, not around its beginning.
     pub of_truth: bool,
 }
 
-impl Brain {
-    /// Loads the built-in brain.
-    pub fn load() -> Result<Self> {
+impl Shape {
+    /// The built-in brain.
+    ///
+    /// # Errors
+    /// If its file cannot be read.
+    pub fn brain() -> Result<Self> {
         let mask = largest_component(&read(&trepan_fixtures::case_head().labels)?.map(|label| u8::from(label > 0.5)));
         let mask: VoxelVolume<u8> = resample(&mask, &Grid::isotropic_over(&mask, MASK_MM), Interpolation::Majority, 0);
         let field = DistanceField::of_mask(&mask);
@@ -99,11 +98,42 @@ impl Brain {
         let start = along.into_iter().find(|p| bounds.contains(*p) && field.sample(*p) <= 0.0);
         let start = start.context("there is no brain")?;
         let normal = disc(8.0, 30, up).map(|aside| field.gradient(start + aside)).sum::<Vec3>().normalize();
-        let labels = mask.map(|voxel| u16::from(voxel != 0));
-        let coarsest = lattice::Config { target_tets: 3_000, ..lattice::Config::default() };
-        let domain = lattice::Domain::of(&labels, &coarsest)?;
-        Ok(Self { domain, place: onto(&field, start, normal), field, normal })
+        let domain = domain(&mask)?;
+        Ok(Self {
+            name: "brain",
+            domain,
+            place: onto(&field, start, normal),
+            field,
+            normal,
+            along: normal.any_orthonormal_vector(),
+            block_mm: None,
+        })
     }
+
+    /// A block of 100x100x60 mm.
+    ///
+    /// # Errors
+    /// If its mask cannot be filled.
+    pub fn block() -> Result<Self> {
+        let (cells, margin) = ([50, 50, 30], 2);
+        let size = Vec3::from_array(cells.map(|n| MASK_MM * n as f32));
+        let first = Vec3::splat(MASK_MM * (0.5 - margin as f32));
+        let mut mask = VoxelVolume::isotropic(cells.map(|n| n + 2 * margin), first, MASK_MM, 0u8);
+        let [nx, ny, _] = cells.map(|n| n + 2 * margin);
+        for at in 0..mask.data.len() {
+            let inside = [at % nx, at / nx % ny, at / (nx * ny)].into_iter().zip(cells);
+            mask.data[at] = u8::from(inside.into_iter().all(|(k, n)| (margin..n + margin).contains(&k)));
+        }
+        let place = Vec3::new(0.5 * size.x, 0.5 * size.y, size.z);
+        let (domain, field) = (domain(&mask)?, DistanceField::of_mask(&mask));
+        Ok(Self { name: "block", domain, field, place, normal: Vec3::Z, along: Vec3::X, block_mm: Some(size) })
+    }
+}
+
+fn domain(mask: &VoxelVolume<u8>) -> Result<lattice::Domain> {
+    let labels = mask.map(|voxel| u16::from(voxel != 0));
+    let coarsest = lattice::Config { target_tets: 3_000, ..lattice::Config::default() };
+    Ok(lattice::Domain::of(&labels, &coarsest)?)
 }
 
 /// Moves a place along the normal to the surface of a mask.
@@ -121,52 +151,43 @@ fn crowded(share: f32, fine: f32, end: f32) -> f32 {
 
 impl Shape {
     /// The name of the scene.
-    fn name(&self, slid: bool) -> String {
-        let body = if matches!(self, Self::Block) { "block" } else { "brain" };
-        format!("{body} {} 5 mm by a ball", if slid { "slid over" } else { "pressed" })
+    fn scene(&self, slid: bool) -> String {
+        format!("{} {} 5 mm by a ball", self.name, if slid { "slid over" } else { "pressed" })
     }
 
     /// Makes a mesh with the ball at the beginning or the end of the slide.
+    ///
+    /// # Errors
+    /// If the mask cannot be filled.
     pub fn pressed(&self, size: Size, slid: bool) -> Result<Pressed> {
-        let [radius_mm, depth_mm] = BALL_MM;
-        let slid_mm = if slid { SLIDE_MM } else { 0.0 };
-        let Size { count, halvings, of_truth } = size;
-        let (mesh, fixed, middle, normal) = match self {
-            Self::Block => {
-                let middle = Vec3::new(50.0 + slid_mm, 50.0, 60.0);
-                // Two ways to cut cells, so that the truth's mesh is not that of the judged ones.
-                let boxes = if of_truth { boxes::split_box } else { boxes::centred_box };
-                let mut mesh = boxes([count, count, count * 6 / 10], Vec3::ONE);
-                let fine = if of_truth { middle } else { Vec3::new(50.0, 50.0, 60.0) };
-                mesh.positions.iter_mut().for_each(|p| {
-                    *p = Vec3::from_array([0, 1, 2].map(|k| crowded(p[k], fine[k], [100.0, 100.0, 60.0][k])))
-                });
-                let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
-                (mesh, fixed, middle, Vec3::Z)
+        let Self { field, normal, along, .. } = self;
+        let middle = onto(field, self.place + *along * if slid { SLIDE_MM } else { 0.0 }, *normal);
+        let stepped = Fineness::stepped(size.count, size.halvings);
+        let mesh = match (size.of_truth, self.block_mm) {
+            // The truth's block has a mesh of another kind than the judged ones.
+            (true, Some(block_mm)) => {
+                let mut mesh = boxes::split_box([size.count, size.count, size.count * 6 / 10], Vec3::ONE);
+                let at = |p: Vec3, k: usize| crowded(p[k], middle[k], block_mm[k]);
+                mesh.positions.iter_mut().for_each(|p| *p = Vec3::new(at(*p, 0), at(*p, 1), at(*p, 2)));
+                mesh
             }
-            Self::Brain(brain) => {
-                let aside = brain.normal.any_orthonormal_vector() * slid_mm;
-                let middle = onto(&brain.field, brain.place + aside, brain.normal);
-                let stepped = Fineness::stepped(count, halvings);
-                let fine = if of_truth {
-                    Fineness { radius_mm: 13.0, above_mm: 5.0, ..stepped }.fine(middle, brain.normal)
-                } else {
-                    stepped.fine(brain.place, brain.normal)
-                };
-                let mesh = brain.mesh(count, fine)?;
-                let fixed = fixed_nodes(&mesh);
-                (mesh, fixed, middle, brain.normal)
+            (true, None) => {
+                self.filled(size.count, Fineness { radius_mm: 13.0, above_mm: 5.0, ..stepped }.fine(middle, *normal))?
             }
+            (false, _) => self.filled(size.count, stepped.fine(self.place, *normal))?,
+        };
+        let fixed = match self.block_mm {
+            Some(_) => boxes::nodes_where(&mesh, |p| p.z < 0.25 * MASK_MM),
+            None => fixed_nodes(&mesh),
         };
         let surface = Surroundings::of(&mesh, middle)?;
         let body = Body::uniform(mesh, fixed, Material::BRAIN);
-        let ball = PressedBall { middle, normal, radius_mm, depth_mm };
-        Ok(Pressed { scene: self.name(slid), body, surface, ball })
+        let [radius_mm, depth_mm] = BALL_MM;
+        let ball = PressedBall { middle, normal: *normal, radius_mm, depth_mm };
+        Ok(Pressed { scene: self.scene(slid), body, surface, ball })
     }
-}
 
-impl Brain {
-    fn mesh(&self, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh> {
+    fn filled(&self, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh> {
         Ok(self.domain.labelled(&lattice::Config { target_tets, fine, ..lattice::Config::default() })?.mesh)
     }
 }
@@ -217,30 +238,26 @@ impl Solution {
 pub fn parts() -> Vec<Part> {
     let of = |name: &str, shape: fn() -> Result<Shape>| {
         Part::new(format!("outside: {name}"), move |scope, findings: &mut Findings| {
-            judge(&shape().expect("the built-in case is there"), scope, findings)
-                .expect("the fixture and the mesh are sound");
+            let shape = shape().expect("the built-in case is there");
+            judge(&shape, scope, findings).expect("the fixture and the meshes are sound");
         })
     };
-    vec![of("block", || Ok(Shape::Block)), of("brain", || Ok(Shape::Brain(Arc::new(Brain::load()?))))]
+    vec![of("block", Shape::block), of("brain", Shape::brain)]
 }
 
-/// Meshes of TLED: those of presets, and finer ones in a full run. The first is that of `usual`.
-fn sizes(shape: &Shape, scope: Scope) -> &'static [Size] {
+/// Meshes of TLED; the first is that of the preset `usual`.
+fn sizes(scope: Scope) -> &'static [Size] {
     const fn of(count: usize, halvings: u32) -> Size {
         Size { count, halvings, of_truth: false }
     }
-    const BLOCK: [Size; 3] = [of(12, 0), of(8, 0), of(20, 0)];
-    const BRAIN: [Size; 4] = [of(8_000, 4), of(3_000, 0), of(8_000, 0), of(20_000, 4)];
-    match shape {
-        Shape::Block => scope.pick(&BLOCK[..2], &BLOCK),
-        Shape::Brain(_) => scope.pick(&BRAIN[..2], &BRAIN),
-    }
+    const ALL: [Size; 5] = [of(8_000, 4), of(3_000, 4), of(8_000, 0), of(20_000, 4), of(50_000, 4)];
+    scope.pick(&ALL[..2], &ALL)
 }
 
 fn judge(shape: &Shape, scope: Scope, findings: &mut Findings) -> Result<()> {
     let stored = Solution::stored()?;
     for slid in [false, true] {
-        let name = shape.name(slid);
+        let name = shape.scene(slid);
         let mut solutions = stored.iter().filter(|solution| solution.scene == name);
         let (Some(coarser), Some(truth)) = (solutions.next(), solutions.next()) else {
             anyhow::bail!("press.jsonl lacks two meshes of {name}");
@@ -252,7 +269,7 @@ fn judge(shape: &Shape, scope: Scope, findings: &mut Findings) -> Result<()> {
             let name = format!("{name}: {what} of two meshes of the truth apart, percent");
             findings.gates.push(Gate::at_most(name, apart, 0.5 * GOAL_PERCENT));
         }
-        for (at, &size) in sizes(shape, scope).iter().enumerate() {
+        for (at, &size) in sizes(scope).iter().enumerate() {
             let pressed = shape.pressed(size, slid)?;
             for (method, averaged_pressure) in [("tled", false), ("tled locking-free", true)] {
                 let (force_n, errors) = step(&pressed, averaged_pressure, truth)?;
@@ -327,18 +344,20 @@ pub struct Export {
 /// # Errors
 /// If the built-in case is not there.
 pub fn exports() -> Result<Vec<Export>> {
-    let shapes = [Shape::Block, Shape::Brain(Arc::new(Brain::load()?))];
-    let of = |(shape, sizes): (&Shape, [Size; 2])| {
-        let shape = shape.clone();
-        [false, true].into_iter().flat_map(move |slid| {
-            let shape = shape.clone();
-            sizes.into_iter().zip(["coarser", "finer"]).map(move |(size, which)| {
+    let shapes = [Shape::block()?, Shape::brain()?];
+    let mut exports = Vec::new();
+    for (shape, sizes) in shapes.iter().zip(TRUTH_SIZES) {
+        for slid in [false, true] {
+            for (size, which) in sizes.into_iter().zip(["coarser", "finer"]) {
                 let pressed = shape.pressed(size, slid)?;
-                Ok(Export { name: format!("{}-{which}", pressed.scene.replace(' ', "-")), json: pressed.json() })
-            })
-        })
-    };
-    shapes.iter().zip(TRUTH_SIZES).flat_map(of).collect()
+                exports.push(Export {
+                    name: format!("{}-{which}", pressed.scene.replace(' ', "-")),
+                    json: pressed.json(),
+                });
+            }
+        }
+    }
+    Ok(exports)
 }
 
 impl Pressed {
