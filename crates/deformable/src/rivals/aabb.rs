@@ -2,6 +2,9 @@
 //!
 //! # Practice
 //! The cheapest to fit, 32 bytes and six comparisons; the loosest round slanted parts.
+//!
+//! # Sources
+//! Van den Bergen 1997; see `volume_tree.rs` for what is refitted when.
 
 use super::volume_tree::{Volume, search};
 use crate::extent::Extent;

@@ -15,6 +15,11 @@
 //! # When not to use it
 //! When the points lie close together, as on a tool: the array of
 //! [`UniformGrid`](super::UniformGrid) is as small and needs no hash.
+//!
+//! # Sources
+//! Teschner et al. 2003: hash function, time stamps, barycentric test. Liberties: points of one
+//! tool instead of the nodes of all bodies; a point keeps its cell, so that two cells in one bucket
+//! give no pair twice.
 
 use super::uniform_grid::fitting_cell;
 use crate::extent::Extent;

@@ -14,6 +14,11 @@
 //! # When not to use it
 //! When the points are all over the mesh: then every lower node is fitted to all mesh nodes below
 //! it, level by level.
+//!
+//! # Sources
+//! Larsson and Akenine-Möller 2001: upper half bottom-up, lower half top-down where visited;
+//! thesis 2.1.2. Liberties: a binary tree of tetrahedra, where theirs has eight children and
+//! triangles; the other side of a test is the tool's box instead of a second tree.
 
 use super::volume_tree::{LEAF, Node, halved};
 use crate::bounded::push_bounded;

@@ -11,6 +11,10 @@
 //!
 //! # When not to use it
 //! For few points in a small box: nearly every tetrahedron there meets nearly every split.
+//!
+//! # Sources
+//! Bentley 1975; thesis 2.1.1. Liberties: the tree is of the tool's points; axes in turn, as
+//! printed, and not by the longest side.
 
 use crate::extent::Extent;
 use crate::method::Descriptor;

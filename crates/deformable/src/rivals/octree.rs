@@ -8,6 +8,10 @@
 //!
 //! # When not to use it
 //! For points that lie evenly, as on a ball: a grid finds their cell without going down.
+//!
+//! # Sources
+//! Meagher 1982; thesis 2.1.1. Liberties: the tree is of the tool's points and not of the scene's
+//! primitives; cells are shrunk to their points.
 
 use crate::extent::Extent;
 use crate::method::Descriptor;

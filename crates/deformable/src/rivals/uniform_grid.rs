@@ -14,6 +14,10 @@
 //!
 //! # When not to use it
 //! For a small tool in a large mesh: it still looks at every tetrahedron's box.
+//!
+//! # Sources
+//! Teschner et al. 2003; thesis 4.2.2. Liberties: an array over the points' box instead of a hash;
+//! points of one tool instead of the nodes of all bodies.
 
 use crate::extent::Extent;
 use crate::method::Descriptor;
