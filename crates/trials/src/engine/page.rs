@@ -21,6 +21,7 @@ struct Section<'a> {
     /// Command that runs one part alone.
     command_of_part: String,
     charts: Vec<Drawn>,
+    traces: Vec<Drawn>,
     maps: Vec<Figure<'a>>,
     /// Number of map cells that work, degrade, fail and are refused.
     grades: [usize; 4],
@@ -33,6 +34,12 @@ struct Section<'a> {
 struct Drawn {
     svg: Option<String>,
     fault: Option<String>,
+}
+
+impl Drawn {
+    fn of<E: std::fmt::Display>(svg: Result<String, E>) -> Self {
+        Self { fault: svg.as_ref().err().map(E::to_string), svg: svg.ok() }
+    }
 }
 
 /// The whole page as HTML. `methods`: the lines of the table of all methods.
@@ -62,6 +69,7 @@ impl<'a> Section<'a> {
             broken: found.gates.iter().filter(|gate| gate.breaks()).count(),
             command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
             charts: charts(suite, report),
+            traces: found.traces.iter().map(|trace| Drawn::of(trace.svg())).collect(),
             maps: found.maps.iter().map(Figure::of).collect(),
             grades,
             tables: found.rows.chunk_by(|a, b| a.metrics.keys().eq(b.metrics.keys())).collect(),
@@ -72,7 +80,8 @@ impl<'a> Section<'a> {
 
 fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
     let own = &report.findings.charts;
-    let drawn = if own.is_empty() { vec![chart_of_all(suite, report)] } else { own.clone() };
+    let has_traces = !report.findings.traces.is_empty();
+    let drawn = if own.is_empty() && !has_traces { vec![chart_of_all(suite, report)] } else { own.clone() };
     let mut methods: Vec<&str> = Vec::new();
     for mark in drawn.iter().flat_map(|chart| &chart.marks) {
         if !methods.contains(&mark.method.as_str()) {
@@ -80,11 +89,10 @@ fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
         }
     }
     let draw = |chart: &Chart| {
-        let svg = match chart.marks.is_empty() {
+        Drawn::of(match chart.marks.is_empty() {
             true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
             false => plot::svg(chart, &methods).map_err(|fault| fault.to_string()),
-        };
-        Drawn { fault: svg.as_ref().err().cloned(), svg: svg.ok() }
+        })
     };
     drawn.iter().map(draw).collect()
 }

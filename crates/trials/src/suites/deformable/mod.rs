@@ -5,8 +5,8 @@ mod poses;
 mod published;
 mod recording;
 mod ride;
-mod scene;
-mod stability;
+pub(super) mod scene;
+pub(super) mod stability;
 mod truth;
 
 pub use recording::record_all;

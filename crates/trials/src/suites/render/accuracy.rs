@@ -12,14 +12,14 @@ use trepan_render::{Casting, Frame, Hit, View};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// Rays through the pixels' centres, row by row.
-fn rays(view: &View, [width, height]: [u32; 2]) -> impl Iterator<Item = Vec3> {
+pub fn rays(view: &View, [width, height]: [u32; 2]) -> impl Iterator<Item = Vec3> {
     let pixels = (0..width * height).map(move |n| Vec2::new((n % width) as f32 + 0.5, (n / width) as f32 + 0.5));
     pixels.map(move |p| view.ray(Vec2::new(2.0 * p.x / width as f32 - 1.0, 1.0 - 2.0 * p.y / height as f32)))
 }
 
 /// Distance to bone along a ray by small steps through the trilinear density in f64, mm: no bricks,
 /// no cells, no roots.
-fn march(bone: &BoneVolume, eye: Vec3, along: Vec3) -> Option<f64> {
+pub fn march(bone: &BoneVolume, eye: Vec3, along: Vec3) -> Option<f64> {
     let spacing = f64::from(bone.spacing_mm());
     let (start, step) = (bone.grid_of(eye).as_dvec3(), along.as_dvec3());
     let middle = DVec3::from(bone.dims().map(|n| 0.5 * (n as f64 - 1.0)));

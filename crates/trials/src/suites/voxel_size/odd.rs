@@ -17,7 +17,7 @@ const DEGRADES: f64 = 1.3;
 const FAILS: f64 = 3.0;
 
 /// Boxes and particles.
-type Scene = (Vec<Aabb>, Vec<Vec3>);
+pub type Scene = (Vec<Aabb>, Vec<Vec3>);
 type Condition = (&'static str, fn() -> Scene);
 
 const CONDITIONS: [Condition; 9] = [
@@ -48,29 +48,26 @@ pub fn run(findings: &mut Findings) {
 }
 
 /// Boxes on a lattice that fills a cube of `edge` mm, each of an edge that its number says.
-fn row_of_boxes(edge: usize, size: impl Fn(usize) -> f32) -> Vec<Aabb> {
+pub fn row_of_boxes(edge: usize, size: impl Fn(usize) -> f32) -> Vec<Aabb> {
     let place = |n: usize| Vec3::new((n % edge) as f32, (n / edge % edge) as f32, (n / (edge * edge)) as f32);
     (0..edge.pow(3)).map(|n| Aabb { min: place(n), max: place(n) + size(n) }).collect()
 }
 
-fn cloud(count: usize, edge: f32) -> Vec<Vec3> {
+/// Particles anywhere in a cube, mm.
+pub fn cloud(count: usize, edge: f32) -> Vec<Vec3> {
     let mut random = fastrand::Rng::with_seed(3);
     (0..count).map(|_| Vec3::new(random.f32(), random.f32(), random.f32()) * edge).collect()
 }
 
-/// Counts of work at the rule's size against the least over a ladder of sizes.
-fn verdict((boxes, particles): &Scene, rule: &str) -> Outcome {
-    let edges = boxes.iter().map(|b| f64::from(b.size().max_element())).sum::<f64>() / boxes.len() as f64;
-    let reach = 20.0 * edges;
-    let size = match rule {
-        OURS | "expected work alone" => {
-            match Expected::of(boxes, particles, reach).and_then(|e| e.best(&PRICES, 0.05 * edges)) {
-                Ok(size) => size,
-                Err(fault) => return Outcome::Refused(fault.to_string()),
-            }
-        }
-        "mean edge" => edges,
-        "1.45 x mean edge" => 1.45 * edges,
+/// Size that a rule takes, mm, or why it takes none.
+pub fn size_by((boxes, particles): &Scene, rule: &str) -> Result<f64, String> {
+    let edges = edges(boxes);
+    match rule {
+        OURS | "expected work alone" => Expected::of(boxes, particles, REACH * edges)
+            .and_then(|expected| expected.best(&PRICES, 0.05 * edges))
+            .map_err(|fault| fault.to_string()),
+        "mean edge" => Ok(edges),
+        "1.45 x mean edge" => Ok(1.45 * edges),
         _ => {
             let model = if rule == "thesis analytic" { Ok(CostModel::default()) } else { PRICES.model(NO_CONTACT) };
             let all = Measures {
@@ -79,26 +76,39 @@ fn verdict((boxes, particles): &Scene, rule: &str) -> Outcome {
                 mean_edge_mm: edges,
                 facet_mm2: 0.5 * edges * edges,
             };
-            let size = all.checked().and_then(|m| model.and_then(|model| model.analytic(&m)));
-            match size {
-                Ok(size) => size,
-                Err(fault) => return Outcome::Refused(fault.to_string()),
-            }
+            let size = all.checked().and_then(|measures| model.and_then(|model| model.analytic(&measures)));
+            size.map_err(|fault| fault.to_string())
         }
-    };
-    judged(boxes, particles, size, edges)
+    }
 }
 
-fn judged(boxes: &[Aabb], particles: &[Vec3], size: f64, edges: f64) -> Outcome {
-    let at = |size: f64| match counts::grid(boxes, particles, size) {
-        Ok(found) => Ok(PRICES.visit * found.visits as f64 + PRICES.test * found.tests as f64),
-        Err(fault) => Err(fault.to_string()),
-    };
-    let own = match at(size) {
-        Ok(work) => work,
+/// Largest size that is looked at, in mean edges.
+const REACH: f64 = 20.0;
+
+fn edges(boxes: &[Aabb]) -> f64 {
+    boxes.iter().map(|b| f64::from(b.size().max_element())).sum::<f64>() / boxes.len() as f64
+}
+
+/// Work of a grid of some cell, µs at the usual prices, or why there can be none.
+pub fn work((boxes, particles): &Scene, cell_mm: f64) -> Result<f64, String> {
+    let found = counts::grid(boxes, particles, cell_mm).map_err(|fault| fault.to_string())?;
+    Ok(PRICES.visit * found.visits as f64 + PRICES.test * found.tests as f64)
+}
+
+/// Work over a ladder of cells: cell, mm, and µs.
+pub fn ladder(scene: &Scene) -> Vec<(f64, f64)> {
+    let edges = edges(&scene.0);
+    let cells = (0..18).map(|n| 0.3 * edges * 1.3f64.powi(n));
+    cells.filter_map(|cell| Some((cell, work(scene, cell).ok()?))).collect()
+}
+
+/// Counts of work at the rule's size against the least over a ladder of sizes.
+fn verdict(scene: &Scene, rule: &str) -> Outcome {
+    let (size, own) = match size_by(scene, rule).and_then(|size| Ok((size, work(scene, size)?))) {
+        Ok(found) => found,
         Err(fault) => return Outcome::Refused(fault),
     };
-    let best = (0..18).filter_map(|n| at(0.3 * edges * 1.3f64.powi(n)).ok()).fold(f64::INFINITY, f64::min);
+    let best = ladder(scene).into_iter().map(|(_, work)| work).fold(f64::INFINITY, f64::min);
     match own / best {
         _ if !size.is_finite() => Outcome::Fails("not a number".into()),
         ratio if ratio <= DEGRADES || best == 0.0 => Outcome::Works,

@@ -1,0 +1,240 @@
+//! Soft tissue: a bar whose rest is wrong, a cube that bursts or does not come back.
+//!
+//! # Theory
+//! A slender bar of neo-Hookean tissue hangs along its axis by one end. At height X from the held
+//! end its nominal stress is the weight below,
+//! ```text
+//! P(λ(X)) = ρ g (L - X),    tip = ∫ (λ(X) - 1) dX
+//! ```
+//! with P(λ) in uniaxial tension with free sides: a closed form at any load and Poisson's ratio.
+//! The held end, which cannot narrow, makes up less than 2 % of it here.
+
+use super::{Candidate, Family, Standing};
+use crate::engine::nearest::{Condition, Scale, Trial};
+use crate::engine::picture::Outcome;
+use crate::suites::tled::closed_forms::{free_side, kirchhoff};
+use crate::suites::tled::rivals::{LONGEST_MS, Left, STILL, Solver, brain, left, let_go_seen, pressed, steps};
+use crate::suites::tled::stability::offset;
+use trepan_geometry::{Vec3, units};
+use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+
+/// Largest error of the bar's tip, as a share.
+const MOST_SHARE: f64 = 0.1;
+
+pub const FAMILY: Family<Solver> = Family {
+    suite: "tled",
+    criterion: "a solver fails when the tip of a hanging bar is more than 10 % from its closed form; when a cube pressed \
+                by a plate bursts, is further than 10 mm from rest, is still shaken a second later (20 mm/s) or is \
+                more than 1 mm from rest two seconds after it was let go; when elements stay inside out or anything \
+                is not a number",
+    methods,
+    conditions: &CONDITIONS,
+};
+
+fn methods() -> Vec<Candidate<Solver>> {
+    let candidate = |(name, method): (&'static str, Solver)| {
+        let standing = match method {
+            Solver::Tled { .. } => Standing::Own,
+            Solver::Rival(rival) => Standing::by_source(name, rival.descriptor().source),
+        };
+        Candidate { name: name.into(), standing, method }
+    };
+    Solver::all().into_iter().map(candidate).collect()
+}
+
+const TIP: [&str; 2] = ["time, ms", "way of the bar's tip, mm"];
+const FURTHEST: [&str; 2] = ["time, ms", "furthest node from rest, mm"];
+
+const CONDITIONS: [Condition<Solver>; 7] = [
+    Condition {
+        name: "load: gravity on a bar",
+        unit: "g",
+        nominal: 1.0,
+        limits: [1.0 / 64.0, 16.0],
+        scale: Scale::Log,
+        axes: TIP,
+        trial: |solver, gravity| bar(solver, &Bar { gravity, ..BAR }),
+    },
+    Condition {
+        name: "Poisson's ratio of a bar",
+        unit: "1",
+        nominal: BAR.poisson,
+        limits: [0.1, 0.4999],
+        scale: Scale::BelowHalf,
+        axes: TIP,
+        trial: |solver, poisson| bar(solver, &Bar { poisson, ..BAR }),
+    },
+    Condition {
+        name: "time step over the stable one",
+        unit: "1",
+        nominal: 1.0,
+        limits: [0.125, 256.0],
+        scale: Scale::Log,
+        axes: TIP,
+        trial: |solver, step| bar(solver, &Bar { step, ..BAR }),
+    },
+    Condition {
+        name: "height of a layer of elements",
+        unit: "edges",
+        nominal: 1.0,
+        limits: [1.0 / 64.0, 1.0],
+        scale: Scale::Log,
+        axes: TIP,
+        trial: |solver, layer| bar(solver, &Bar { layer, ..BAR }),
+    },
+    Condition {
+        name: "stiffness of a contact",
+        unit: "N/mm",
+        nominal: 1.0,
+        limits: [0.01, 1e4],
+        scale: Scale::Log,
+        axes: FURTHEST,
+        trial: contact,
+    },
+    Condition {
+        name: "depth of a press of 40 mm",
+        unit: "mm",
+        nominal: 10.0,
+        limits: [1.0, 39.9],
+        scale: Scale::Log,
+        axes: FURTHEST,
+        trial: |solver, depth| released(solver, depth as f32, 0.1),
+    },
+    Condition {
+        name: "speed of a press by 10 mm",
+        unit: "mm/s",
+        nominal: 100.0,
+        limits: [10.0, 1e5],
+        scale: Scale::Log,
+        axes: FURTHEST,
+        trial: |solver, speed| released(solver, 10.0, speed as f32 / 1000.0),
+    },
+];
+
+/// A hanging bar.
+struct Bar {
+    /// Times the Earth's.
+    gravity: f64,
+    poisson: f64,
+    /// Times the solver's own stable step.
+    step: f64,
+    /// Height of the layer in the middle, of a regular one's.
+    layer: f64,
+}
+
+const BAR: Bar = Bar { gravity: 1.0, poisson: 0.45, step: 1.0, layer: 1.0 };
+const LENGTH_MM: f64 = 60.0;
+const CELLS: [usize; 3] = [12, 2, 2];
+
+fn bar(of: &Solver, bar: &Bar) -> Trial {
+    let size = Vec3::new(LENGTH_MM as f32, 10.0, 10.0);
+    let mut mesh = boxes::split_box(CELLS, size);
+    let cell_mm = size.x / CELLS[0] as f32;
+    let moved = boxes::nodes_where(&mesh, |p| ((p.x - 0.5 * size.x) / cell_mm).abs() < 0.1);
+    let fall_mm = (1.0 - bar.layer as f32) * cell_mm;
+    moved.into_iter().for_each(|node| mesh.positions[node as usize].x -= fall_mm);
+    let fixed = boxes::nodes_where(&mesh, |p| p.x < 1e-3);
+    let tip = boxes::nodes_where(&mesh, |p| p.distance(Vec3::new(size.x, 5.0, 5.0)) < 1e-3)[0] as usize;
+    let material =
+        Material::NeoHookean { young_mpa: 0.003, poisson: bar.poisson as f32, density_g_mm3: units::WATER_G_PER_MM3 };
+    let body = Body::uniform(mesh, fixed, material);
+    let gravity = bar.gravity * f64::from(units::GRAVITY_MM_PER_MS2);
+    let loads = Loads { gravity: Vec3::X * gravity as f32, ..Loads::default() };
+    let way = |solver: &dyn SoftSolver| f64::from(solver.positions()[tip].x) - LENGTH_MM;
+    let (found, trace, last) = run(of, &body, &loads, bar.step, way);
+    let truth = tip_mm(material, gravity);
+    let off = last / truth - 1.0;
+    let wrong = (!(off.abs() <= MOST_SHARE)).then(|| format!("the tip is {:+.0} % off", 100.0 * off));
+    Trial { fault: broken(&found).or(wrong), trace }
+}
+
+/// Way of the tip of a bar of this material, mm, under an acceleration in mm/ms².
+fn tip_mm(material: Material, gravity: f64) -> f64 {
+    const SLICES: usize = 40;
+    let stress = |stretch: f64| {
+        let side = free_side(|t| kirchhoff(material, [t, t, stretch])[0]);
+        kirchhoff(material, [side, side, stretch])[2] / stretch
+    };
+    let slice = LENGTH_MM / SLICES as f64;
+    let stretched = |n: usize| {
+        let below = LENGTH_MM - (n as f64 + 0.5) * slice;
+        let weight = f64::from(units::WATER_G_PER_MM3) * gravity * below;
+        let (mut low, mut high) = (1.0, 20.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if stress(middle) < weight { low = middle } else { high = middle }
+        }
+        (low - 1.0) * slice
+    };
+    (0..SLICES).map(stretched).sum()
+}
+
+/// Two seconds under steady loads: what was left, a trace, and its last value.
+fn run(
+    of: &Solver,
+    body: &Body,
+    loads: &Loads,
+    step: f64,
+    measure: impl Fn(&dyn SoftSolver) -> f64,
+) -> (Left, Vec<(f64, f64)>, f64) {
+    let mut solver = of.build(body);
+    let dt_ms = step as f32 * solver.stable_dt_ms().min(LONGEST_MS);
+    let steps = 2 * steps(of, dt_ms);
+    let mut watch = Watch::every(dt_ms, steps);
+    let found = left(&mut *solver, body, loads, dt_ms, steps, &mut |solver| watch.see(|| measure(solver)));
+    (found, watch.trace, measure(&*solver))
+}
+
+/// A trace of some hundred points.
+struct Watch {
+    dt_ms: f32,
+    every: usize,
+    step: usize,
+    trace: Vec<(f64, f64)>,
+}
+
+impl Watch {
+    fn every(dt_ms: f32, steps: usize) -> Self {
+        Self { dt_ms, every: steps.div_ceil(400).max(1), step: 0, trace: Vec::new() }
+    }
+
+    fn see(&mut self, measure: impl FnOnce() -> f64) {
+        self.step += 1;
+        if self.step % self.every == 0 {
+            self.trace.push((self.step as f64 * f64::from(self.dt_ms), measure()));
+        }
+    }
+}
+
+/// What no body may be after a run.
+fn broken(found: &Left) -> Option<String> {
+    match () {
+        () if !found.offset_mm.is_finite() => Some("not a number".into()),
+        () if found.put_back > 0 => Some("nodes burst and are put back".into()),
+        () if found.inverted > 0 => Some(format!("{} elements stay inside out", found.inverted)),
+        () if !(found.fastest <= STILL) => Some(format!("still moves by {:.2} mm/ms", found.fastest)),
+        () => None,
+    }
+}
+
+/// A plate 2 mm into a cube.
+fn contact(of: &Solver, stiffness: f64) -> Trial {
+    let body = brain();
+    let loads = pressed(stiffness as f32, 2.0);
+    let (found, trace, furthest) = run(of, &body, &loads, 1.0, |solver| offset(solver, &body));
+    let far = (!(furthest <= 10.0)).then(|| format!("a node is {furthest:.0} mm from rest"));
+    Trial { fault: broken(&found).or(far), trace }
+}
+
+/// A plate that comes down on a cube at a speed, mm/ms, and is gone half a second later.
+fn released(of: &Solver, depth_mm: f32, speed: f32) -> Trial {
+    let body = brain();
+    let dt_ms = of.build(&body).stable_dt_ms().min(LONGEST_MS);
+    let mut watch = Watch::every(dt_ms, 3 * steps(of, dt_ms));
+    let outcome = let_go_seen(of, depth_mm, speed, &mut |solver| watch.see(|| offset(solver, &body)));
+    let fault = match outcome {
+        Outcome::Fails(reason) => Some(reason),
+        _ => None,
+    };
+    Trial { fault, trace: watch.trace }
+}
