@@ -105,8 +105,8 @@ impl<M> Condition<M> {
         Self { limits: [self.limits[0].max(low), self.limits[1].min(high)], ..*self }
     }
 
-    /// The nearest failure of a method, or `None` between the limits. `step` is the distance between
-    /// trials on the way outwards, octaves.
+    /// The nearest failure of a method, or `None` between the limits. `step` is the distance
+    /// between trials on the way outwards, octaves.
     pub fn nearest(&self, method: &M, step: f64) -> Option<Failure> {
         let start = match self.tried(method, self.nominal) {
             Ok(works) => works,

@@ -252,8 +252,8 @@ fn over_an_edge(model: &Model) -> Outcome {
     }
 }
 
-/// Moves over an edge at 50 mm/s, 0.5 mm deep at 1 N/mm, 5 mm to each side; returns the largest
-/// change of force in a tick, N. `record` gets the force along the edge's plane, N.
+/// Largest change of force in a tick, N, on a way over an edge. The way is 5 mm to each side, at
+/// 50 mm/s, 0.5 mm deep at 1 N/mm. `record` gets the force along the edge's plane, N.
 pub fn slid_over_an_edge(model: &Model, angle_deg: f32, mut record: impl FnMut(f32)) -> f32 {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     let (mut force, mut last, mut most) = ((model.make)(1.0), None::<Vec3>, 0.0f32);

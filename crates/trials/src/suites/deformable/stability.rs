@@ -138,8 +138,8 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// Random poses near the mesh, three in ten a jump; the mesh is made anew at every step. `each` gets
-/// how many points too many the method found at every step.
+/// Random poses near the mesh, three in ten a jump; the mesh is made anew at every step. `each`
+/// gets how many points too many the method found at every step.
 pub fn endure(condition: &Condition, method: Method, steps: usize, scope: Scope, mut each: impl FnMut(f64)) -> Record {
     let mut mesh = super::scene::five_split(CELLS, EDGE_MM);
     mesh.positions.iter_mut().for_each(|p| *p = (condition.shape)(*p));

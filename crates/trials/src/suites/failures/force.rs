@@ -1,7 +1,7 @@
 //! Contact force: a pressed hand that does not come to rest, a wall that pushes on through, a jump
 //! at an edge.
 
-use super::{Candidate, Family, Standing};
+use super::{Candidate, Family, Scope, Standing};
 use crate::engine::nearest::{Condition, Scale, Trial};
 use crate::suites::force::{CHOSEN, Model, Press, QUIET_MM, models, press_into, slid_over_an_edge};
 use trepan_haptics::simulated::HandModel;
@@ -15,13 +15,12 @@ pub const FAMILY: Family<Model> = Family {
                 no friction, exact encoders: only the model and the hand damp), when a wall pushes the tool further in, \
                 when the force changes by more than 0.5 N in a tick over an edge, or is not a number",
     methods,
-    conditions: &CONDITIONS,
 };
 
-fn methods() -> Vec<Candidate<Model>> {
+fn methods(_: Scope) -> Vec<Candidate<Model>> {
     let candidate = |(name, method): (&'static str, Model)| {
         let standing = if name == CHOSEN { Standing::Own } else { Standing::by_source(name, "") };
-        Candidate { name: name.into(), standing, method }
+        Candidate { name: name.into(), standing, conditions: &CONDITIONS, method }
     };
     models().into_iter().map(candidate).collect()
 }

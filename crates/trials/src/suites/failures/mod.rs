@@ -31,7 +31,7 @@ use serde_json::Value;
 /// Distance between trials on the way outwards, octaves: of a quick run and of a full one.
 const STEP: [f64; 2] = [1.0, 0.5];
 /// Largest change of a condition in a quick run, octaves.
-const QUICK_REACH: f64 = 4.0;
+const QUICK_REACH: f64 = 3.0;
 
 /// Where a method comes from, in the order of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,21 +55,22 @@ impl Standing {
     }
 }
 
-/// A method under trial.
-struct Candidate<M> {
+/// A method under trial, and the conditions that are changed.
+struct Candidate<M: 'static> {
     name: String,
     standing: Standing,
     method: M,
+    conditions: &'static [Condition<M>],
 }
 
-/// Methods that answer the same question, and the conditions that are changed.
+/// Methods that answer the same question.
 struct Family<M: 'static> {
     /// Suite that measures the methods' accuracy.
     suite: &'static str,
     /// What fails, the same for all methods.
     criterion: &'static str,
-    methods: fn() -> Vec<Candidate<M>>,
-    conditions: &'static [Condition<M>],
+    /// Methods of a quick or a full run.
+    methods: fn(Scope) -> Vec<Candidate<M>>,
 }
 
 /// A family as the table needs it.
@@ -81,23 +82,23 @@ struct Listed {
 
 impl<M> Family<M> {
     /// A part for each method.
-    fn parts(&'static self) -> Vec<Part> {
+    fn parts(&'static self, scope: Scope) -> Vec<Part> {
         let part = |candidate: Candidate<M>| {
             let name = format!("{} {}", self.suite, candidate.name);
             Part::new(name, move |scope, findings: &mut Findings| self.probe(&candidate, scope, findings))
         };
-        (self.methods)().into_iter().map(part).collect()
+        (self.methods)(scope).into_iter().map(part).collect()
     }
 
     /// One part for all methods, where listing them is costly.
     fn part(&'static self) -> Part {
         Part::new(self.suite, |scope, findings: &mut Findings| {
-            (self.methods)().iter().for_each(|candidate| self.probe(candidate, scope, findings));
+            (self.methods)(scope).iter().for_each(|candidate| self.probe(candidate, scope, findings));
         })
     }
 
-    fn listed(&self) -> Listed {
-        let methods = (self.methods)().into_iter().map(|candidate| candidate.name).collect();
+    fn listed(&self, scope: Scope) -> Listed {
+        let methods = (self.methods)(scope).into_iter().map(|candidate| candidate.name).collect();
         Listed { suite: self.suite, criterion: self.criterion, methods }
     }
 
@@ -107,14 +108,17 @@ impl<M> Family<M> {
         let found = |condition: &'static Condition<M>| {
             (condition, condition.within(reach).nearest(&candidate.method, scope.pick(STEP[0], STEP[1])))
         };
-        let found: Vec<_> = self.conditions.iter().map(found).collect();
+        let found: Vec<_> = candidate.conditions.iter().map(found).collect();
         findings.rows.extend(
             found.iter().map(|(condition, failure)| self.row(candidate, &condition.within(reach), failure.as_ref())),
         );
         let mut traced: Vec<_> = found.iter().filter_map(|(of, failure)| Some((*of, failure.as_ref()?))).collect();
         traced.sort_by(|a, b| a.1.octaves().total_cmp(&b.1.octaves()));
         let kept = if candidate.standing == Standing::Own { traced.len() } else { 1 };
-        findings.traces.extend(traced.iter().take(kept).map(|(of, failure)| trace(&candidate.name, of, failure)));
+        findings.traces.extend(traced.iter().take(kept).map(|(of, failure)| {
+            let whose = title(self.suite, &candidate.name);
+            trace(&whose, of, failure)
+        }));
     }
 
     fn row(&self, candidate: &Candidate<M>, condition: &Condition<M>, failure: Option<&Failure>) -> Row {
@@ -144,13 +148,18 @@ fn suffix(unit: &str) -> String {
     }
 }
 
-fn trace<M>(method: &str, condition: &Condition<M>, failure: &Failure) -> Trace {
+/// Start of a trace's title.
+fn title(suite: &str, method: &str) -> String {
+    format!("{suite}: {method}, ")
+}
+
+fn trace<M>(whose: &str, condition: &Condition<M>, failure: &Failure) -> Trace {
     let run = |word: &str, tried: &Tried| {
         Run::new(format!("{word} at {}", amount(tried.value, condition.unit)), &tried.trace)
     };
     let works = failure.works.iter().map(|works| run("works", works));
     Trace {
-        title: format!("{method}, {}: {}", condition.name, failure.fault),
+        title: format!("{whose}{}: {}", condition.name, failure.fault),
         axes: condition.axes.map(String::from),
         runs: works.chain([run("fails", &failure.at)]).collect(),
     }
@@ -162,31 +171,31 @@ fn amount(value: f64, unit: &str) -> String {
 }
 
 /// A part for every method of every family.
-pub fn parts(_: Scope) -> Vec<Part> {
-    let mut parts = rigid::FAMILY.parts();
-    parts.extend(deformable::FAMILY.parts());
-    parts.extend(soft::FAMILY.parts());
-    parts.extend(force::FAMILY.parts());
-    parts.extend(voxel_size::FAMILY.parts());
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let mut parts = rigid::FAMILY.parts(scope);
+    parts.extend(deformable::FAMILY.parts(scope));
+    parts.extend(soft::FAMILY.parts(scope));
+    parts.extend(force::FAMILY.parts(scope));
+    parts.extend(voxel_size::FAMILY.parts(scope));
     parts.push(render::FAMILY.part());
     parts
 }
 
 /// Every family with its methods.
-fn families() -> [Listed; 6] {
+fn families(scope: Scope) -> [Listed; 6] {
     [
-        rigid::FAMILY.listed(),
-        deformable::FAMILY.listed(),
-        soft::FAMILY.listed(),
-        force::FAMILY.listed(),
-        voxel_size::FAMILY.listed(),
-        render::FAMILY.listed(),
+        rigid::FAMILY.listed(scope),
+        deformable::FAMILY.listed(scope),
+        soft::FAMILY.listed(scope),
+        force::FAMILY.listed(scope),
+        voxel_size::FAMILY.listed(scope),
+        render::FAMILY.listed(scope),
     ]
 }
 
 /// Adds the tables of nearest failures, what counts as one, and the gates.
-pub fn judge(_: Scope, findings: &mut Findings) {
-    table::judge(&families(), findings);
+pub fn judge(scope: Scope, findings: &mut Findings) {
+    table::judge(&families(scope), findings);
 }
 
 /// The nearest failure of a method of a suite's family in words; `None` if it was not tried.

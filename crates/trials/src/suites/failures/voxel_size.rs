@@ -1,6 +1,6 @@
 //! Voxel size: a rule whose grid works more than twice as hard as the best one.
 
-use super::{Candidate, Family, Standing};
+use super::{Candidate, Family, Scope, Standing};
 use crate::engine::nearest::{Condition, Scale, Trial};
 use crate::suites::voxel_size::odd::{Scene, cloud, ladder, row_of_boxes, size_by, work};
 use crate::suites::voxel_size::{OURS, RULES};
@@ -9,22 +9,21 @@ use trepan_geometry::{Aabb, Vec3};
 /// Largest work over that of the best cell.
 const MOST: f64 = 2.0;
 /// Boxes along an axis, each of 1 mm, and particles.
-const EDGE: usize = 12;
-const PARTICLES: f64 = 1500.0;
+const EDGE: usize = 8;
+const PARTICLES: f64 = 450.0;
 
 pub const FAMILY: Family<&str> = Family {
     suite: "voxel-size",
     criterion: "a rule fails when the grid of its cell does more than twice the work of the best of 18 cells (visits \
                 and tests are counted and weighted by their usual prices), or when it gives no cell",
     methods,
-    conditions: &CONDITIONS,
 };
 
-fn methods() -> Vec<Candidate<&'static str>> {
+fn methods(_: Scope) -> Vec<Candidate<&'static str>> {
     let candidate = |rule: &'static str| {
         let own = rule == OURS || rule == RULES[1];
         let standing = if own { Standing::Own } else { Standing::by_source(rule, "") };
-        Candidate { name: rule.into(), standing, method: rule }
+        Candidate { name: rule.into(), standing, conditions: &CONDITIONS, method: rule }
     };
     RULES.into_iter().map(candidate).collect()
 }
@@ -40,11 +39,16 @@ const fn condition(
     Condition { name, unit, nominal, limits, scale: Scale::Log, axes, trial }
 }
 
-const CONDITIONS: [Condition<&str>; 5] = [
-    condition("particles", "1", PARTICLES, [2.0, 48_000.0], |rule, count| {
+const CONDITIONS: [Condition<&str>; 6] = [
+    condition("particles", "1", PARTICLES, [2.0, 16_000.0], |rule, count| {
         grid(rule, (row_of_boxes(EDGE, |_| 1.0), cloud(count as usize, EDGE as f32)))
     }),
-    condition("size of the particles' cloud", "mm", EDGE as f64, [0.01, 190.0], |rule, size| {
+    condition("elements along an axis", "1", EDGE as f64, [1.0, 24.0], |rule, edge| {
+        let edge = edge.round();
+        let particles = PARTICLES * (edge / EDGE as f64).powi(3);
+        grid(rule, (row_of_boxes(edge as usize, |_| 1.0), cloud(particles.ceil() as usize, edge as f32)))
+    }),
+    condition("size of the particles' cloud", "mm", EDGE as f64, [0.01, 128.0], |rule, size| {
         let middle = Vec3::splat(0.5 * (EDGE as f32 - size as f32));
         let particles = cloud(PARTICLES as usize, size as f32).into_iter().map(|p| p + middle).collect();
         grid(rule, (row_of_boxes(EDGE, |_| 1.0), particles))
