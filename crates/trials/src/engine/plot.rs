@@ -202,7 +202,7 @@ impl Label {
 }
 
 /// Axis label with three significant digits.
-pub fn tick(value: &f64) -> String {
+fn tick(value: &f64) -> String {
     let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 7.0);
     let text = format!("{value:.*}", digits as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }

@@ -22,7 +22,6 @@ mod voxel_size;
 
 use super::{Part, Scope};
 use crate::engine::nearest::{Condition, Failure, Tried};
-use crate::engine::plot::tick;
 use crate::engine::report::Report;
 use crate::engine::suite::{Findings, Row};
 use crate::engine::trace::{Run, Trace};
@@ -130,7 +129,7 @@ impl<M> Family<M> {
             .with("unit", condition.unit)
             .with("nominal", condition.nominal);
         match failure {
-            None => row.with("none", format!("none from {} to {}", tick(&low), amount(high, condition.unit))),
+            None => row.with("none", format!("none from {} to {}", number(low), amount(high, condition.unit))),
             Some(failure) => row
                 .with("fault", failure.fault.as_str())
                 .metric("failure_factor", failure.factor)
@@ -165,9 +164,16 @@ fn trace<M>(whose: &str, condition: &Condition<M>, failure: &Failure) -> Trace {
     }
 }
 
-/// Three significant digits and the unit.
+/// A number and its unit.
 fn amount(value: f64, unit: &str) -> String {
-    if unit == "1" { tick(&value) } else { format!("{} {unit}", tick(&value)) }
+    if unit == "1" { number(value) } else { format!("{} {unit}", number(value)) }
+}
+
+/// Four significant digits, which tell 0.4999 from a half.
+fn number(value: f64) -> String {
+    let digits = (3.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0);
+    let text = format!("{value:.*}", digits as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
 /// A part for every method of every family.

@@ -245,3 +245,15 @@ fn sphere(method: &Option<Method>, voxel_mm: f64) -> Trial {
     };
     Trial { fault, trace }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gil's bound, K < b/(T/2 + d), from both sides, in spite of the guard.
+    #[test]
+    fn the_exact_wall_rests_within_its_bound_and_shakes_far_beyond_it() {
+        assert_eq!(hand(&None, HAND, QUANTUM_MM).fault, None);
+        assert!(hand(&None, coupling::Cell { tick_ms: 16.0, ..HAND }, QUANTUM_MM).fault.is_some());
+    }
+}

@@ -98,21 +98,19 @@ fn map(family: &Listed, rows: &[Row]) -> Map {
     };
     let cells = conditions.iter().map(|condition| family.methods.iter().map(|of| cell(condition, of)).collect());
     Map {
-        title: format!(
-            "{}: works as it stands and up to 8 times the change, fails within it, fails as it stands",
-            family.suite
-        ),
+        title: format!("{}: how far the nearest failure is", family.suite),
         x: "method".into(),
         y: "condition".into(),
         columns: family.methods.clone(),
         cells: cells.collect(),
         rows: conditions.iter().map(ToString::to_string).collect(),
+        notes: vec!["Works: no failure up to 8 times the change. Degrades: within it. Fails: as it stands.".into()],
         ..Map::default()
     }
 }
 
-/// Adds tables, maps, criteria and gates. The tables: the nearest failure of every method, and every
-/// condition of our own.
+/// Adds tables, maps, criteria and gates. The tables: the nearest failure of every method, and
+/// every condition of our own.
 pub fn judge(families: &[Listed], findings: &mut Findings) {
     let rows = findings.rows.clone();
     let of = |suite: &str, method: &str| -> Vec<&Row> {

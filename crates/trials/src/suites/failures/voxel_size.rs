@@ -2,9 +2,10 @@
 
 use super::{Candidate, Family, Scope, Standing};
 use crate::engine::nearest::{Condition, Scale, Trial};
-use crate::suites::voxel_size::odd::{Scene, cloud, ladder, row_of_boxes, size_by, work};
+use crate::suites::voxel_size::odd::{PRICES, Scene, cloud, ladder, row_of_boxes, size_by, work};
 use crate::suites::voxel_size::{OURS, RULES};
 use trepan_geometry::{Aabb, Vec3};
+use trepan_voxel_size::Prices;
 
 /// Largest work over that of the best cell.
 const MOST: f64 = 2.0;
@@ -39,7 +40,7 @@ const fn condition(
     Condition { name, unit, nominal, limits, scale: Scale::Log, axes, trial }
 }
 
-const CONDITIONS: [Condition<&str>; 6] = [
+const CONDITIONS: [Condition<&str>; 7] = [
     condition("particles", "1", PARTICLES, [2.0, 16_000.0], |rule, count| {
         grid(rule, (row_of_boxes(EDGE, |_| 1.0), cloud(count as usize, EDGE as f32)))
     }),
@@ -47,6 +48,10 @@ const CONDITIONS: [Condition<&str>; 6] = [
         let edge = edge.round();
         let particles = PARTICLES * (edge / EDGE as f64).powi(3);
         grid(rule, (row_of_boxes(edge as usize, |_| 1.0), cloud(particles.ceil() as usize, edge as f32)))
+    }),
+    condition("error of the timed price of a test", "1", 1.0, [1.0 / 64.0, 64.0], |rule, error| {
+        let scene = (row_of_boxes(EDGE, |_| 1.0), cloud(PARTICLES as usize, EDGE as f32));
+        priced(rule, &scene, &Prices { test: error * PRICES.test, ..PRICES })
     }),
     condition("size of the particles' cloud", "mm", EDGE as f64, [0.01, 128.0], |rule, size| {
         let middle = Vec3::splat(0.5 * (EDGE as f32 - size as f32));
@@ -69,12 +74,17 @@ const CONDITIONS: [Condition<&str>; 6] = [
     }),
 ];
 
-/// A rule on boxes and particles.
+/// A rule that knows the prices.
 fn grid(rule: &str, scene: Scene) -> Trial {
-    let ladder = ladder(&scene);
+    priced(rule, &scene, &PRICES)
+}
+
+/// A rule that takes these for the prices.
+fn priced(rule: &str, scene: &Scene, prices: &Prices) -> Trial {
+    let ladder = ladder(scene);
     let best = ladder.iter().map(|(_, work)| *work).fold(f64::INFINITY, f64::min);
     let trace = ladder.iter().map(|(cell, work)| (*cell, work / best)).collect();
-    let fault = match size_by(&scene, rule).and_then(|cell| Ok((cell, work(&scene, cell)?))) {
+    let fault = match size_by(scene, rule, prices).and_then(|cell| Ok((cell, work(scene, cell)?))) {
         Err(fault) => Some(format!("gives no cell: {fault}")),
         Ok((_, own)) if own <= MOST * best => None,
         Ok((cell, own)) => Some(format!("takes a cell of {cell:.2} mm: {:.1} times the least work", own / best)),

@@ -9,7 +9,7 @@ use trepan_geometry::{Aabb, Vec3};
 use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
 
 /// Prices of a usual machine, µs: ratios decide, and they are much the same on all.
-const PRICES: Prices = Prices { fixed: 0.0, visit: 0.004, doubt: 0.006, test: 0.02 };
+pub const PRICES: Prices = Prices { fixed: 0.0, visit: 0.004, doubt: 0.006, test: 0.02 };
 /// The thesis's share of boxes that touch nothing.
 const NO_CONTACT: f64 = 0.99;
 /// Work beyond that of the best size, by which a rule degrades, and fails.
@@ -59,17 +59,17 @@ pub fn cloud(count: usize, edge: f32) -> Vec<Vec3> {
     (0..count).map(|_| Vec3::new(random.f32(), random.f32(), random.f32()) * edge).collect()
 }
 
-/// Size that a rule takes, mm, or why it takes none.
-pub fn size_by((boxes, particles): &Scene, rule: &str) -> Result<f64, String> {
+/// Size that a rule takes at some prices, mm, or why it takes none.
+pub fn size_by((boxes, particles): &Scene, rule: &str, prices: &Prices) -> Result<f64, String> {
     let edges = edges(boxes);
     match rule {
         OURS | "expected work alone" => Expected::of(boxes, particles, REACH * edges)
-            .and_then(|expected| expected.best(&PRICES, 0.05 * edges))
+            .and_then(|expected| expected.best(prices, 0.05 * edges))
             .map_err(|fault| fault.to_string()),
         "mean edge" => Ok(edges),
         "1.45 x mean edge" => Ok(1.45 * edges),
         _ => {
-            let model = if rule == "thesis analytic" { Ok(CostModel::default()) } else { PRICES.model(NO_CONTACT) };
+            let model = if rule == "thesis analytic" { Ok(CostModel::default()) } else { prices.model(NO_CONTACT) };
             let all = Measures {
                 elements: boxes.len(),
                 longest_edge_mm: edges,
@@ -104,7 +104,7 @@ pub fn ladder(scene: &Scene) -> Vec<(f64, f64)> {
 
 /// Counts of work at the rule's size against the least over a ladder of sizes.
 fn verdict(scene: &Scene, rule: &str) -> Outcome {
-    let (size, own) = match size_by(scene, rule).and_then(|size| Ok((size, work(scene, size)?))) {
+    let (size, own) = match size_by(scene, rule, &PRICES).and_then(|size| Ok((size, work(scene, size)?))) {
         Ok(found) => found,
         Err(fault) => return Outcome::Refused(fault),
     };
