@@ -18,6 +18,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Ratio of the failing to the last working value at which bisection ends.
 pub const RESOLUTION: f64 = 1.05;
 
+/// Whether a value is over a limit or not a number.
+pub fn exceeds(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
+}
+
 /// How a condition is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {

@@ -5,7 +5,7 @@
 //! of a ball is known in closed form: how far it was pushed past the side.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial};
+use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::deformable::scene::{self, Scene};
 use crate::suites::deformable::stability::{self, EDGE_MM, PLAIN, cube, endure};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
@@ -86,7 +86,7 @@ const CONDITIONS: [Condition<Method>; 10] = [
         axes: POINTS,
         trial: |method, leap| {
             let leaps = |step: usize, _: &mut fastrand::Rng, positions: &mut [Vec3]| {
-                let up = if step % 2 == 0 { 0.0 } else { leap as f32 };
+                let up = if step.is_multiple_of(2) { 0.0 } else { leap as f32 };
                 positions.iter_mut().for_each(|p| p.z += up);
             };
             points(method, &stability::Condition { motion: &leaps, ..PLAIN })
@@ -225,7 +225,7 @@ fn depths(method: &Method, scene: &Scene, tip: &Tip, way: impl Iterator<Item = (
         let found = f64::from(out.manifold.depth_mm);
         trial.trace.push((f64::from(at.distance(*first.get_or_insert(at))), found));
         let off = (found - truth).abs();
-        if trial.fault.is_none() && !(off <= MOST_MM) {
+        if trial.fault.is_none() && exceeds(off, MOST_MM) {
             trial.fault = Some(format!("a depth of {truth:.2} mm is felt as {found:.2} mm"));
         }
     }

@@ -2,12 +2,12 @@
 //! at an edge.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial};
+use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::force::{CHOSEN, Model, Press, QUIET_MM, models, press_into, slid_over_an_edge};
 use trepan_haptics::simulated::HandModel;
 
 /// Largest change of force in a tick, N.
-const MOST_N: f32 = 0.5;
+const MOST_N: f64 = 0.5;
 
 pub const FAMILY: Family<Model> = Family {
     suite: "force",
@@ -95,7 +95,9 @@ fn pressed(model: &Model, press: &Press) -> Trial {
     let fault = match () {
         () if !held.finite => Some("not a number".into()),
         () if held.inward_n > 1e-3 => Some(format!("pushes the tool further in, by up to {:.2} N", held.inward_n)),
-        () if held.cycle_mm > QUIET_MM => Some(format!("the hand swings by {:.2} mm", held.cycle_mm)),
+        () if exceeds(held.cycle_mm.into(), QUIET_MM.into()) => {
+            Some(format!("the hand swings by {:.2} mm", held.cycle_mm))
+        }
         () => None,
     };
     Trial { fault, trace }
@@ -104,6 +106,6 @@ fn pressed(model: &Model, press: &Press) -> Trial {
 fn edge(model: &Model, angle: f64) -> Trial {
     let mut trace = Vec::new();
     let most = slid_over_an_edge(model, angle as f32, |force| trace.push((trace.len() as f64, force.into())));
-    let fault = (most.is_nan() || most > MOST_N).then(|| format!("the force jumps by {most:.2} N in a tick"));
+    let fault = (exceeds(most.into(), MOST_N)).then(|| format!("the force jumps by {most:.2} N in a tick"));
     Trial { fault, trace }
 }

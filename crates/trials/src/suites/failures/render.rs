@@ -1,7 +1,7 @@
 //! Picture: rays that pass through bone, or stop beside it.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial};
+use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::render::accuracy::{march, rays};
 use crate::suites::render::faults::{Drawer, drawers, made};
 use crate::suites::render::scenes::{ISO, frame};
@@ -127,7 +127,7 @@ fn compared(by: &Picture, bone: &Arc<BoneVolume>, frame: &Frame) -> Trial {
     let truth: Vec<Option<f64>> = rays.par_iter().map(|ray| march(bone, view.eye, *ray)).collect();
     let found = || hits.iter().map(|hit| hit.map(|hit| f64::from(hit.distance_mm)));
     let wrong = found().zip(&truth).filter(|(hit, truth)| match (hit, truth) {
-        (Some(hit), Some(truth)) => !((hit - truth).abs() <= MOST_MM),
+        (Some(hit), Some(truth)) => exceeds((hit - truth).abs(), MOST_MM),
         (hit, truth) => hit.is_some() != truth.is_some(),
     });
     let (wrong, all) = (wrong.count(), truth.len());

@@ -10,7 +10,7 @@
 //! ```
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial};
+use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::rigid::coupling::{self, QUIET_MM};
 use crate::suites::rigid::solid::{KINDS, RADIUS_MM};
 use crate::suites::rigid::{STIFFNESS, walls};
@@ -213,7 +213,7 @@ fn hand(method: &Option<Method>, cell: coupling::Cell, quantum_mm: f64) -> Trial
         trace.push((trace.len() as f64 * f64::from(cell.tick_ms), height_mm));
     };
     let cycle_mm = coupling::cycle_mm(method.as_ref(), &bone, normal, cell, quantum_mm as f32, true, &mut record);
-    let fault = (cycle_mm.is_nan() || cycle_mm > QUIET_MM).then(|| format!("the hand swings by {cycle_mm:.2} mm"));
+    let fault = (exceeds(cycle_mm.into(), QUIET_MM.into())).then(|| format!("the hand swings by {cycle_mm:.2} mm"));
     Trial { fault, trace }
 }
 

@@ -10,7 +10,7 @@
 //! The held end, which cannot narrow, stiffens a real bar by a few percent.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial};
+use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::engine::picture::Outcome;
 use crate::suites::tled::closed_forms::{free_side, kirchhoff};
 use crate::suites::tled::rivals::{LONGEST_MS, Left, STILL, Solver, brain, left, let_go_seen, pressed, steps};
@@ -146,7 +146,7 @@ fn bar(of: &Solver, bar: &Bar) -> Trial {
     let (found, trace, last) = run(of, &body, &loads, bar.step, way);
     let truth = tip_mm(material, gravity);
     let off = last / truth - 1.0;
-    let wrong = (!(off.abs() <= MOST_SHARE)).then(|| format!("the tip is {:+.0} % off", 100.0 * off));
+    let wrong = exceeds(off.abs(), MOST_SHARE).then(|| format!("the tip is {:+.0} % off", 100.0 * off));
     Trial { fault: broken(&found).or(wrong), trace }
 }
 
@@ -213,7 +213,7 @@ impl Watch {
 
     fn see(&mut self, measure: impl FnOnce() -> f64) {
         self.step += 1;
-        if self.step % self.every == 0 {
+        if self.step.is_multiple_of(self.every) {
             self.trace.push((self.step as f64 * f64::from(self.dt_ms), measure()));
         }
     }
@@ -225,7 +225,7 @@ fn broken(found: &Left) -> Option<String> {
         () if !found.offset_mm.is_finite() => Some("not a number".into()),
         () if found.put_back > 0 => Some("nodes burst and are put back".into()),
         () if found.inverted > 0 => Some(format!("{} elements stay inside out", found.inverted)),
-        () if !(found.fastest <= STILL) => Some(format!("still moves by {:.2} mm/ms", found.fastest)),
+        () if exceeds(found.fastest.into(), STILL.into()) => Some(format!("still moves by {:.2} mm/ms", found.fastest)),
         () => None,
     }
 }
@@ -235,7 +235,7 @@ fn contact(of: &Solver, stiffness: f64) -> Trial {
     let body = brain();
     let loads = pressed(stiffness as f32, 2.0);
     let (found, trace, furthest) = run(of, &body, &loads, 1.0, |solver| offset(solver, &body));
-    let far = (!(furthest <= 10.0)).then(|| format!("a node is {furthest:.0} mm from rest"));
+    let far = exceeds(furthest, 10.0).then(|| format!("a node is {furthest:.0} mm from rest"));
     Trial { fault: broken(&found).or(far), trace }
 }
 

@@ -69,7 +69,7 @@ const CONDITIONS: [Condition<&str>; 7] = [
         grid(rule, (boxes, cloud(PARTICLES as usize, EDGE as f32)))
     }),
     condition("edge of one element in 24", "mm", 1.0, [1.0, 64.0], |rule, edge| {
-        let size = |n: usize| if n % 24 == 0 { edge as f32 } else { 1.0 };
+        let size = |n: usize| if n.is_multiple_of(24) { edge as f32 } else { 1.0 };
         grid(rule, (row_of_boxes(EDGE, size), cloud(PARTICLES as usize, EDGE as f32)))
     }),
 ];

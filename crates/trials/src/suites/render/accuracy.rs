@@ -35,7 +35,7 @@ pub fn march(bone: &BoneVolume, eye: Vec3, along: Vec3) -> Option<f64> {
             return Some((at - FINE_VOXEL * now / (now - under)) * spacing);
         }
         if under > before && under >= now {
-            let peak = peak(&over, at - 2.0 * FINE_VOXEL, at);
+            let peak = peak(over, at - 2.0 * FINE_VOXEL, at);
             if over(peak) >= 0.0 {
                 return Some(peak * spacing);
             }
