@@ -23,6 +23,7 @@ struct Section<'a> {
     command_of_part: String,
     charts: Vec<Drawn>,
     series: Vec<Drawn>,
+    traces: Vec<Drawn>,
     maps: Vec<Figure<'a>>,
     /// Number of map cells that work, degrade, fail and are refused.
     grades: [usize; 4],
@@ -38,9 +39,8 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn of(svg: Result<String, Box<dyn std::error::Error>>) -> Self {
-        let svg = svg.map_err(|fault| fault.to_string());
-        Self { fault: svg.as_ref().err().cloned(), svg: svg.ok() }
+    fn of<E: std::fmt::Display>(svg: Result<String, E>) -> Self {
+        Self { fault: svg.as_ref().err().map(E::to_string), svg: svg.ok() }
     }
 }
 
@@ -75,6 +75,7 @@ impl<'a> Section<'a> {
             command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
             charts: charts(suite, report),
             series: found.series.iter().map(|series| Drawn::of(curve::svg(series))).collect(),
+            traces: found.traces.iter().map(|trace| Drawn::of(trace.svg())).collect(),
             maps: found.maps.iter().map(Figure::of).collect(),
             grades,
             tables: found.rows.chunk_by(|a, b| a.metrics.keys().eq(b.metrics.keys())).collect(),
@@ -85,7 +86,7 @@ impl<'a> Section<'a> {
 
 fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
     let own = &report.findings.charts;
-    let needed = own.is_empty() && report.findings.series.is_empty();
+    let needed = own.is_empty() && report.findings.series.is_empty() && report.findings.traces.is_empty();
     let drawn = if needed { vec![chart_of_all(suite, report)] } else { own.clone() };
     let mut methods: Vec<&str> = Vec::new();
     for mark in drawn.iter().flat_map(|chart| &chart.marks) {
@@ -95,8 +96,8 @@ fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
     }
     let draw = |chart: &Chart| {
         Drawn::of(match chart.marks.is_empty() {
-            true => Err(format!("no row has {} and {}", chart.cost, chart.error).into()),
-            false => plot::svg(chart, &methods),
+            true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
+            false => plot::svg(chart, &methods).map_err(|fault| fault.to_string()),
         })
     };
     drawn.iter().map(draw).collect()

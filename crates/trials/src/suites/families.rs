@@ -133,6 +133,8 @@ pub struct Measured {
     error: String,
     /// Number of map cells that work, degrade, fail and are refused.
     cells: [usize; 4],
+    /// Condition whose smallest change breaks it; empty without the suite `failures`.
+    nearest_failure: String,
     /// Whether nothing is missing.
     is_whole: bool,
 }
@@ -140,6 +142,7 @@ pub struct Measured {
 /// All methods of the families in the reports, with medians over all of their scenes.
 pub fn measured(reports: &[(&Suite, Report)]) -> Vec<Measured> {
     let mut measured = Vec::new();
+    let failures = reports.iter().find(|(suite, _)| suite.name == "failures").map(|(_, report)| report);
     for family in &FAMILIES {
         let Some((_, report)) = reports.iter().find(|(suite, _)| suite.name == family.suite) else { continue };
         for method in (family.methods)(report) {
@@ -152,6 +155,9 @@ pub fn measured(reports: &[(&Suite, Report)]) -> Vec<Measured> {
                 family: family.name,
                 cost: shown(&known.speed, family.speed[0]),
                 error: shown(&known.accuracy, family.accuracy[0]),
+                nearest_failure: failures
+                    .and_then(|report| super::failures::nearest_of(report, family.suite, &method))
+                    .unwrap_or_default(),
                 is_whole: known.lacks().is_empty(),
                 cells: known.cells,
                 method,

@@ -37,14 +37,14 @@ const STIFF: f32 = 1.5;
 const TICKS: usize = 3000;
 const JUDGED: usize = 1000;
 /// Largest allowed oscillation, mm, and change of force per tick, N.
-const QUIET_MM: f32 = 0.1;
+pub const QUIET_MM: f32 = 0.1;
 const SMOOTH_N: f32 = 0.1;
 /// Model that a session uses for tissue, and below the drill's vibration for bone.
-const CHOSEN: &str = "viscoelastic";
+pub const CHOSEN: &str = "viscoelastic";
 
 /// Force model of a given stiffness, and whether a god-object finds the contact.
 #[derive(Clone, Copy)]
-struct Model {
+pub struct Model {
     make: fn(f32) -> Box<dyn ForceModel>,
     proxy: bool,
 }
@@ -53,7 +53,8 @@ fn damped(stiffness: f32) -> Viscoelastic {
     Viscoelastic { stiffness, damping: DAMPING }
 }
 
-fn models() -> Vec<(&'static str, Model)> {
+/// All models with their names.
+pub fn models() -> Vec<(&'static str, Model)> {
     let nearest = |make| Model { make, proxy: false };
     vec![
         ("hooke (thesis)", nearest(|stiffness| Box::new(Hooke { stiffness }))),
@@ -127,19 +128,41 @@ fn calls(rounds: usize) -> Vec<Samples> {
 
 /// Measurements of a pressing hand.
 #[derive(Clone, Copy, Default)]
-struct Held {
+pub struct Held {
     error_n: f64,
-    cycle_mm: f32,
+    /// How far the hand still moves at the end, mm.
+    pub cycle_mm: f32,
     /// Largest force against the wall's outward normal, N.
-    inward_n: f32,
-    finite: bool,
+    pub inward_n: f32,
+    /// Whether every force was a number.
+    pub finite: bool,
 }
 
-/// Presses a hand into a wall at x ≤ 0, `thick` mm thick or infinite, and holds it there.
+/// A wall and the loop in which a hand presses it.
+#[derive(Clone, Copy)]
+pub struct Press {
+    /// N/mm.
+    pub stiffness: f32,
+    /// Ticks.
+    pub delay_ticks: usize,
+    /// Thickness of the wall; `None` for a half-space.
+    pub thick_mm: Option<f32>,
+    /// Length of a tick, ms.
+    pub tick_ms: f32,
+    /// The hand that presses.
+    pub hand: HandModel,
+}
+
 fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>) -> Held {
-    let hand = HandModel::LIGHT;
+    press_into(model, &Press { stiffness, delay_ticks, thick_mm, tick_ms: 1.0, hand: HandModel::LIGHT }, |_| ())
+}
+
+/// Presses a hand into a wall at x ≤ 0 and holds it there. `record` gets the handle's x at every
+/// tick, mm.
+pub fn press_into(model: &Model, press: &Press, mut record: impl FnMut(f32)) -> Held {
+    let Press { stiffness, delay_ticks, thick_mm, tick_ms, hand } = *press;
     let goal = thick_mm.map_or(MEANT_MM, |thick| thick + 2.0);
-    let intent = (0..TICKS).map(|tick| at((2.0 - 0.05 * tick as f32).max(-goal))).collect();
+    let intent = (0..TICKS).map(|tick| at((2.0 - 0.05 * tick_ms * tick as f32).max(-goal))).collect();
     let config = Config { delay_ticks, friction_n: 0.0, quantum_mm: 0.0, ..Config::default() };
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity: None, ..GuardConfig::default() });
@@ -147,12 +170,13 @@ fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>
     let truth = stiffness * hand.stiffness / (stiffness + hand.stiffness) * goal;
     let (mut squares, mut way, mut held) = (0.0f64, (f32::MAX, f32::MIN), Held { finite: true, ..Held::default() });
     for tick in 0..TICKS {
-        let tool = device.read(tick as f64).tool;
+        let tool = device.read(tick as f64 * f64::from(tick_ms)).tool;
         let touch = if model.proxy { by_proxy(&mut proxy, tool.tip()) } else { nearest(tool.tip().x, thick_mm) };
-        let wrench = force.wrench(&tool, &touch, 1.0);
+        let wrench = force.wrench(&tool, &touch, tick_ms);
         held.finite &= wrench.force.is_finite();
         held.inward_n = held.inward_n.max(-wrench.force.x);
-        device.apply(guard.guard(wrench, &tool, 1.0));
+        device.apply(guard.guard(wrench, &tool, tick_ms));
+        record(device.position().x);
         if tick + JUDGED >= TICKS {
             squares += f64::from(wrench.force.x - truth).powi(2);
             way = (way.0.min(device.position().x), way.1.max(device.position().x));
@@ -219,23 +243,31 @@ fn held_back(held: &Held) -> Outcome {
     if held.inward_n > 1e-3 { Outcome::Fails("pushes on through the wall".into()) } else { quiet(held) }
 }
 
-/// Moves over an edge at 50 mm/s, 0.5 mm deep, 5 mm to each side.
+/// Largest change of force in a tick over an edge of 30°.
 fn over_an_edge(model: &Model) -> Outcome {
-    let (mut force, mut last, mut most) = ((model.make)(1.0), None::<Vec3>, 0.0f32);
-    for tick in 0..200 {
-        let way = 0.05 * tick as f32 - 5.0;
-        let normal =
-            if way < 0.0 { Vec3::X } else { Vec3::new(30f32.to_radians().cos(), 30f32.to_radians().sin(), 0.0) };
-        let tool = ToolState::at(Pose::from_translation(Vec3::new(-0.5, way, 0.0)));
-        let touch = Contact { point: Vec3::Y * way, normal, depth_mm: 0.5 };
-        let now = force.wrench(&tool, &ContactManifold::single(touch), 1.0).force;
-        most = most.max(last.replace(now).map_or(0.0, |was| now.distance(was)));
-    }
-    match most {
-        _ if !most.is_finite() => Outcome::Fails("not a number".into()),
+    match slid_over_an_edge(model, 30.0, |_| ()) {
+        most if !most.is_finite() => Outcome::Fails("not a number".into()),
         most if most <= SMOOTH_N => Outcome::Works,
         _ => Outcome::Degrades("the force jumps by over 0.1 N in a tick".into()),
     }
+}
+
+/// Largest change of force in a tick, N, on a way over an edge. The way is 5 mm to each side, at
+/// 50 mm/s, 0.5 mm deep at 1 N/mm. `record` gets the force along the edge's plane, N.
+pub fn slid_over_an_edge(model: &Model, angle_deg: f32, mut record: impl FnMut(f32)) -> f32 {
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    let (mut force, mut last, mut most) = ((model.make)(1.0), None::<Vec3>, 0.0f32);
+    for tick in 0..200 {
+        let way = 0.05 * tick as f32 - 5.0;
+        let normal = if way < 0.0 { Vec3::X } else { Vec3::new(cos, sin, 0.0) };
+        let tool = ToolState::at(Pose::from_translation(Vec3::new(-0.5, way, 0.0)));
+        let touch = Contact { point: Vec3::Y * way, normal, depth_mm: 0.5 };
+        let now = force.wrench(&tool, &ContactManifold::single(touch), 1.0).force;
+        record(now.y);
+        let change = last.replace(now).map_or(0.0, |was| now.distance(was));
+        most = if change.is_nan() { f32::NAN } else { most.max(change) };
+    }
+    most
 }
 
 fn finite(model: &Model, dt_ms: f32, depth_mm: f32) -> Outcome {

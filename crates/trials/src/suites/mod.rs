@@ -5,6 +5,7 @@ pub mod budget;
 mod claims;
 mod conditions;
 pub mod deformable;
+mod failures;
 pub mod families;
 mod force;
 mod haptics;
@@ -93,6 +94,13 @@ pub const ALL: &[Suite] = &[
         chart: ("step_p50_us", "depth_error_p95_mm"),
         parts: deformable::parts,
         judge: deformable::judge,
+    },
+    Suite {
+        name: "failures",
+        question: "which smallest change of one condition breaks each method, and how",
+        chart: ("failure_factor", "failure_factor"),
+        parts: failures::parts,
+        judge: failures::judge,
     },
     Suite {
         name: "force",

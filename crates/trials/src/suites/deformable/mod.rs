@@ -6,7 +6,7 @@ pub(super) mod published;
 pub(super) mod recording;
 mod ride;
 pub(super) mod scene;
-mod stability;
+pub(super) mod stability;
 mod truth;
 
 pub use recording::record_all;

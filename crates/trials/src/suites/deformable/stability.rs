@@ -10,23 +10,29 @@ use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::TetMesh;
 
 const CELLS: usize = 6;
-const EDGE_MM: f32 = 5.0;
+/// Edge of the cube's cells, mm.
+pub const EDGE_MM: f32 = 5.0;
 const SIZE_MM: f32 = CELLS as f32 * EDGE_MM;
 
+/// Moves the nodes at a step.
+type Motion<'a> = dyn Fn(usize, &mut fastrand::Rng, &mut [Vec3]) + 'a;
+
 /// One way to make it hard.
-struct Condition {
-    name: &'static str,
-    radius_mm: f32,
+#[derive(Clone, Copy)]
+pub struct Condition<'a> {
+    pub name: &'static str,
+    pub radius_mm: f32,
     /// Cell of the grids, in edges; `None` leaves it to the method.
-    cell_edges: Option<f32>,
+    pub cell_edges: Option<f32>,
     /// The mesh at rest, node by node.
-    shape: fn(Vec3) -> Vec3,
+    pub shape: &'a dyn Fn(Vec3) -> Vec3,
     /// The mesh at this step.
-    motion: fn(usize, &mut fastrand::Rng, &mut [Vec3]),
+    pub motion: &'a Motion<'a>,
 }
 
-const PLAIN: Condition =
-    Condition { name: "plain", radius_mm: 2.0, cell_edges: None, shape: |p| p, motion: |_, _, _| {} };
+/// Nothing is hard.
+pub const PLAIN: Condition =
+    Condition { name: "plain", radius_mm: 2.0, cell_edges: None, shape: &|p| p, motion: &|_, _, _| {} };
 
 const CONDITIONS: [Condition; 16] = [
     PLAIN,
@@ -36,15 +42,15 @@ const CONDITIONS: [Condition; 16] = [
     Condition { name: "cell of 20 edges", cell_edges: Some(20.0), ..PLAIN },
     Condition { name: "tool larger than two rings", radius_mm: 12.0, ..PLAIN },
     Condition { name: "tool of a twentieth of an edge", radius_mm: 0.25, ..PLAIN },
-    Condition { name: "slivers of 1/1000 edge", shape: slivers, ..PLAIN },
-    Condition { name: "graded 1:100", shape: graded, ..PLAIN },
-    Condition { name: "clustered", shape: clustered, ..PLAIN },
-    Condition { name: "flat, no volume anywhere", shape: flat, ..PLAIN },
-    Condition { name: "stands still, then leaps", motion: stale, ..PLAIN },
-    Condition { name: "leaves its place", motion: leaves, ..PLAIN },
-    Condition { name: "NaN nodes", motion: nan, ..PLAIN },
-    Condition { name: "inverted", motion: inverted, ..PLAIN },
-    Condition { name: "torn in every way", motion: everything, ..PLAIN },
+    Condition { name: "slivers of 1/1000 edge", shape: &slivers, ..PLAIN },
+    Condition { name: "graded 1:100", shape: &graded, ..PLAIN },
+    Condition { name: "clustered", shape: &clustered, ..PLAIN },
+    Condition { name: "flat, no volume anywhere", shape: &flat, ..PLAIN },
+    Condition { name: "stands still, then leaps", motion: &stale, ..PLAIN },
+    Condition { name: "leaves its place", motion: &leaves, ..PLAIN },
+    Condition { name: "NaN nodes", motion: &nan, ..PLAIN },
+    Condition { name: "inverted", motion: &inverted, ..PLAIN },
+    Condition { name: "torn in every way", motion: &everything, ..PLAIN },
 ];
 
 /// Every second layer of nodes lies almost on the one below.
@@ -93,19 +99,20 @@ fn everything(step: usize, random: &mut fastrand::Rng, positions: &mut [Vec3]) {
     }
 }
 
-fn cube(random: &mut fastrand::Rng) -> Vec3 {
+/// A random vector within ±1 along each axis.
+pub fn cube(random: &mut fastrand::Rng) -> Vec3 {
     Vec3::from_array(core::array::from_fn(|_| 2.0 * random.f32() - 1.0))
 }
 
 /// What one method did under one condition.
 #[derive(Default)]
-struct Record {
-    missed_points: u64,
+pub struct Record {
+    pub missed_points: u64,
     missed_contacts: u64,
-    invented_points: u64,
+    pub invented_points: u64,
     touching: u64,
-    inside: u64,
-    not_finite: u64,
+    pub inside: u64,
+    pub not_finite: u64,
     overflow: u64,
     stale: u64,
     skipped: u64,
@@ -117,7 +124,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     let methods: Vec<(&str, Method)> = Method::all().into_iter().map(|method| (method.name(), method)).collect();
     let mut all: Vec<(usize, Method, Record)> = Vec::new();
     let verdict = |at: usize, method: &Method| {
-        let record = endure(&CONDITIONS[at], *method, steps(*method), scope);
+        let record = endure(&CONDITIONS[at], *method, steps(*method), scope, |_| ());
         let outcome = record.outcome();
         all.push((at, *method, record));
         outcome
@@ -131,8 +138,9 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// Random poses near the mesh, three in ten a jump; the mesh is made anew at every step.
-fn endure(condition: &Condition, method: Method, steps: usize, scope: Scope) -> Record {
+/// Random poses near the mesh, three in ten a jump; the mesh is made anew at every step. `each`
+/// gets how many points too many the method found at every step.
+pub fn endure(condition: &Condition, method: Method, steps: usize, scope: Scope, mut each: impl FnMut(f64)) -> Record {
     let mut mesh = super::scene::five_split(CELLS, EDGE_MM);
     mesh.positions.iter_mut().for_each(|p| *p = (condition.shape)(*p));
     let config = Config { method, cell_mm: condition.cell_edges.map(|c| c * EDGE_MM), ..Config::default() };
@@ -150,7 +158,10 @@ fn endure(condition: &Condition, method: Method, steps: usize, scope: Scope) -> 
         let tip = local + if condition.name == "leaves its place" { Vec3::X * (0.2 * step as f32) } else { Vec3::ZERO };
         let state = ToolState::at(Pose::from_translation(tip));
         collision.step(&positions, &still, &state, &mut out);
-        record.compare(&out, truth(&mesh, &positions, &shell, tip));
+        let (surely, perhaps) = truth(&mesh, &positions, &shell, tip);
+        record.compare(&out, (surely, perhaps));
+        let found = u64::from(out.points_in_contact);
+        each(found as f64 - found.clamp(surely, perhaps) as f64);
     }
     record
 }

@@ -12,29 +12,47 @@ use trepan_render::{Casting, Frame, Hit, View};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// Rays through the pixels' centres, row by row.
-fn rays(view: &View, [width, height]: [u32; 2]) -> impl Iterator<Item = Vec3> {
+pub fn rays(view: &View, [width, height]: [u32; 2]) -> impl Iterator<Item = Vec3> {
     let pixels = (0..width * height).map(move |n| Vec2::new((n % width) as f32 + 0.5, (n / width) as f32 + 0.5));
     pixels.map(move |p| view.ray(Vec2::new(2.0 * p.x / width as f32 - 1.0, 1.0 - 2.0 * p.y / height as f32)))
 }
 
 /// Distance to bone along a ray by small steps through the trilinear density in f64, mm: no bricks,
-/// no cells, no roots.
-fn march(bone: &BoneVolume, eye: Vec3, along: Vec3) -> Option<f64> {
+/// no cells, no roots. Peaks between steps are searched, so that a ray that grazes bone for less
+/// than a step hits it.
+pub fn march(bone: &BoneVolume, eye: Vec3, along: Vec3) -> Option<f64> {
     let spacing = f64::from(bone.spacing_mm());
     let (start, step) = (bone.grid_of(eye).as_dvec3(), along.as_dvec3());
     let middle = DVec3::from(bone.dims().map(|n| 0.5 * (n as f64 - 1.0)));
     let reach = middle.length() + 2.0;
-    let (closest, mut under) = ((middle - start).dot(step), -1e9);
+    let over = |at: f64| density(bone, start + at * step) - f64::from(bone.isovalue());
+    let closest = (middle - start).dot(step);
+    let (mut before, mut under) = (-1e9, -1e9);
     let mut at = (closest - reach).max(0.0);
     while at < closest + reach {
-        let over = density(bone, start + at * step) - f64::from(bone.isovalue());
-        if over >= 0.0 {
-            return Some((at - FINE_VOXEL * over / (over - under)) * spacing);
+        let now = over(at);
+        if now >= 0.0 {
+            return Some((at - FINE_VOXEL * now / (now - under)) * spacing);
         }
-        under = over;
+        if under > before && under >= now {
+            let peak = peak(over, at - 2.0 * FINE_VOXEL, at);
+            if over(peak) >= 0.0 {
+                return Some(peak * spacing);
+            }
+        }
+        (before, under) = (under, now);
         at += FINE_VOXEL;
     }
     None
+}
+
+/// Where a function with one peak between two places has it, by ternary search.
+fn peak(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    for _ in 0..24 {
+        let third = (high - low) / 3.0;
+        if of(low + third) < of(high - third) { low += third } else { high -= third }
+    }
+    0.5 * (low + high)
 }
 
 fn density(bone: &BoneVolume, at: DVec3) -> f64 {
@@ -188,5 +206,6 @@ mod tests {
         let mm = march(&bone, Vec3::new(0.3, 0.2, -50.0), Vec3::Z).unwrap();
         assert!((mm - 50.0).abs() < 1e-6, "{mm}");
         assert_eq!(march(&bone, Vec3::new(30.0, 0.0, -50.0), Vec3::Z), None);
+        assert!((peak(|x| -(x - 0.3).powi(2), -1.0, 2.0) - 0.3).abs() < 1e-3);
     }
 }

@@ -34,7 +34,8 @@ pub fn run(gpu: Option<&Gpu>, findings: &mut Findings) {
     }
 }
 
-fn made(edge: [usize; 3], hu: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
+/// Bone of a rule in voxels of 1 mm around the origin.
+pub fn made(edge: [usize; 3], hu: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
     let low = Vec3::from(edge.map(|n| 0.5 - 0.5 * n as f32));
     let mut ct = VoxelVolume::isotropic(edge, low, 1.0, AIR_HU);
     for at in 0..ct.data.len() {
@@ -82,17 +83,24 @@ fn conditions() -> Vec<Condition> {
     ]
 }
 
+/// A setting, and the number of the drawer that draws with it: 0 the processor, 1 the device.
+pub type Drawer = (usize, Setting);
+
 /// All settings of pictures by whoever knows them, named as in the chart.
+pub fn drawers(has_device: bool) -> Vec<(String, Drawer)> {
+    let settings = SETTINGS.iter().map(|setting| (format!("processor: {}", setting.name), (0, *setting)));
+    let on_device = SETTINGS.iter().filter(|setting| has_device && speed::known_to_device(setting));
+    settings.chain(on_device.map(|setting| (format!("device: {}", setting.name), (1, *setting)))).collect()
+}
+
+/// Every condition by every drawer.
 fn bone_map(gpu: Option<&Gpu>, findings: &mut Findings) {
     let conditions = conditions();
     let names: Vec<&str> = conditions.iter().map(|(name, ..)| *name).collect();
-    let settings = SETTINGS.iter().map(|setting| (format!("processor: {}", setting.name), (0, *setting)));
-    let on_device = SETTINGS.iter().filter(|setting| gpu.is_some() && speed::known_to_device(setting));
-    let on_device = on_device.map(|setting| (format!("device: {}", setting.name), (1, *setting)));
-    let drawers: Vec<(String, (usize, Setting))> = settings.chain(on_device).collect();
-    let drawers: Vec<(&str, (usize, Setting))> = drawers.iter().map(|(name, by)| (name.as_str(), *by)).collect();
+    let drawers = drawers(gpu.is_some());
+    let drawers: Vec<(&str, Drawer)> = drawers.iter().map(|(name, by)| (name.as_str(), *by)).collect();
     let mut open: Option<(usize, Vec<By>)> = None;
-    let verdict = |at: usize, &(by, setting): &(usize, Setting)| {
+    let verdict = |at: usize, &(by, setting): &Drawer| {
         let (_, bone, frame, size) = &conditions[at];
         // Conditions come one after the other: their drawers are made once.
         let (_, drawers) = match &mut open {

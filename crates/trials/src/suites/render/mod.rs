@@ -1,14 +1,14 @@
 //! Rendering: accuracy of rays against a brute-force f64 march, bores, GPU against CPU, effect of
 //! empty-space skipping, sparse rays, step and resolution, failures.
 
-mod accuracy;
+pub(super) mod accuracy;
 mod bores;
-mod faults;
+pub(super) mod faults;
 mod likeness;
 mod models;
 pub mod rivals;
 pub(super) mod scenes;
-mod speed;
+pub(super) mod speed;
 
 use super::{Part, Scope};
 use crate::engine::suite::Findings;
@@ -20,29 +20,34 @@ use trepan_volume::BoneVolume;
 /// Step of the reference along a ray, voxels.
 const FINE_VOXEL: f64 = 1.0 / 16.0;
 
-type Hits = Vec<Option<Hit>>;
+pub type Hits = Vec<Option<Hit>>;
 
 /// Renderer: GPU or CPU.
-enum By {
+pub enum By {
+    /// The CPU.
     Processor(Box<ProcessorRenderer>),
+    /// The GPU.
     Device(Box<Renderer>),
 }
 
 /// Settings of the 3-D view.
 #[derive(Clone, Copy)]
-struct Setting {
-    name: &'static str,
-    casting: Casting,
+pub struct Setting {
+    /// Name.
+    pub name: &'static str,
+    /// How rays are cast.
+    pub casting: Casting,
     /// Fraction of the pixels along an edge.
-    detail: f32,
+    pub detail: f32,
 }
 
 /// Setting of still pictures.
-const EXACT: Setting =
+pub const EXACT: Setting =
     Setting { name: "exact", casting: Casting { leap: true, step_voxel: None, sparse: false }, detail: 1.0 };
 
 /// Setting of the CPU while the camera moves.
-const SPARSE: Setting = Setting { name: "sparse rays", casting: Casting { sparse: true, ..EXACT.casting }, ..EXACT };
+pub const SPARSE: Setting =
+    Setting { name: "sparse rays", casting: Casting { sparse: true, ..EXACT.casting }, ..EXACT };
 
 /// Lists the parts: accuracy on small pictures, speed on large ones, models and failures.
 pub fn parts(_: Scope) -> Vec<Part> {
@@ -65,7 +70,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
 
 impl By {
     /// The CPU renderer, and the GPU one if there is a device.
-    fn all(bone: &Arc<BoneVolume>, gpu: Option<&Gpu>, size: [u32; 2]) -> Vec<Self> {
+    pub fn all(bone: &Arc<BoneVolume>, gpu: Option<&Gpu>, size: [u32; 2]) -> Vec<Self> {
         Self::of(&SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None }, gpu, size)
     }
 
@@ -90,7 +95,7 @@ impl By {
     }
 
     /// Applies a setting and invalidates the last picture.
-    fn set(&mut self, setting: &Setting, size: [u32; 2]) {
+    pub fn set(&mut self, setting: &Setting, size: [u32; 2]) {
         match self {
             Self::Processor(p) => {
                 p.resize(size.map(|n| (n as f32 * setting.detail).round() as u32)).expect("the size is allowed");
@@ -104,7 +109,7 @@ impl By {
     }
 
     /// Draws a frame and waits for it.
-    fn draw(&mut self, frame: &Frame) {
+    pub fn draw(&mut self, frame: &Frame) {
         match self {
             Self::Processor(p) => drop(p.draw(frame).expect("drawn")),
             Self::Device(r) => {
@@ -114,7 +119,7 @@ impl By {
         }
     }
 
-    fn hits(&self) -> Hits {
+    pub fn hits(&self) -> Hits {
         match self {
             Self::Processor(p) => p.bone_hits(),
             Self::Device(r) => r.bone_hits().expect("the hits are read"),
@@ -128,7 +133,7 @@ impl By {
         }
     }
 
-    fn view(&self, frame: &Frame) -> View {
+    pub fn view(&self, frame: &Frame) -> View {
         match self {
             Self::Processor(p) => p.view(frame),
             Self::Device(r) => r.view(frame),

@@ -29,6 +29,7 @@ use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::BoneVolume;
 
+/// Length of a tick in the map, ms.
 const TICK_MS: f32 = 1.0;
 /// N/mm, stiffest first: the rows.
 const STIFFNESS: [f32; 7] = [10.0, 5.0, 2.0, 1.0, 0.5, 0.25, 0.1];
@@ -39,10 +40,12 @@ const QUANTUM_MM: [f32; 2] = [0.02, 0.055];
 /// HandModel that adds no damping.
 const HAND: HandModel = HandModel { mass_g: 50.0, damping: 0.0, stiffness: 0.15 };
 const FORCE_N: f32 = 1.0;
+/// Speed of the hand, mm/ms.
 const APPROACH: f32 = 0.1;
 const TICKS: usize = 1800;
 const JUDGED: usize = 600;
-const QUIET_MM: f32 = 0.1;
+/// Largest movement of a handle that counts as quiet, mm.
+pub const QUIET_MM: f32 = 0.1;
 /// Share of the bound within which a wall must be quiet.
 const SURE: f32 = 0.8;
 
@@ -55,12 +58,14 @@ pub struct Cell {
     pub damping: f32,
     /// Ticks.
     pub delay: usize,
+    /// Length of a tick, ms.
+    pub tick_ms: f32,
 }
 
 impl Cell {
     /// Gil's bound, N/mm.
     fn bound(&self) -> f32 {
-        self.damping / (TICK_MS * (0.5 + self.delay as f32))
+        self.damping / (self.tick_ms * (0.5 + self.delay as f32))
     }
 }
 
@@ -96,7 +101,7 @@ fn chart(method: Option<&Method>, bone: &BoneVolume, normal: Vec3, scope: Scope,
     let stiffness = scope.pick(&STIFFNESS[1..5], &STIFFNESS[..]);
     let (damping, delay) = (scope.pick(&DAMPING[1..2], &DAMPING[..]), scope.pick(&DELAY[..3], &DELAY[..]));
     let columns: Vec<(f32, usize)> = damping.iter().flat_map(|&b| delay.iter().map(move |&d| (b, d))).collect();
-    let at = |k: f32, (damping, delay): (f32, usize)| Cell { stiffness: k, damping, delay };
+    let at = |k: f32, (damping, delay): (f32, usize)| Cell { stiffness: k, damping, delay, tick_ms: TICK_MS };
     let quanta = scope.pick(&QUANTUM_MM[1..], &QUANTUM_MM[..]);
     let judged = |k: f32, column| judge(method, bone, normal, at(k, column), quanta);
     let cells: Vec<Vec<Outcome>> =
@@ -156,7 +161,8 @@ fn height(rows: &[f32], k: f32) -> f64 {
 /// wall.
 pub fn judge(method: Option<&Method>, bone: &BoneVolume, normal: Vec3, cell: Cell, quanta: &[f32]) -> Outcome {
     let worst = |guarded: bool| {
-        quanta.iter().map(|&quantum| cycle_mm(method, bone, normal, cell, quantum, guarded)).fold(0.0, f32::max)
+        let cycle = |&quantum| cycle_mm(method, bone, normal, cell, quantum, guarded, |_| ());
+        quanta.iter().map(cycle).fold(0.0, f32::max)
     };
     if worst(false) <= QUIET_MM {
         return Outcome::Works;
@@ -167,20 +173,23 @@ pub fn judge(method: Option<&Method>, bone: &BoneVolume, normal: Vec3, cell: Cel
     Outcome::Fails("shakes by more than 0.1 mm in spite of the guard".into())
 }
 
-/// How far the handle moves at the end of a press, mm.
-fn cycle_mm(
+/// How far the handle moves at the end of a press, mm. `record` gets the handle's position at every
+/// tick, mm.
+pub fn cycle_mm(
     method: Option<&Method>,
     bone: &BoneVolume,
     normal: Vec3,
     cell: Cell,
     quantum_mm: f32,
     guarded: bool,
+    mut record: impl FnMut(Vec3),
 ) -> f32 {
     let config = Config { damping: cell.damping, delay_ticks: cell.delay, quantum_mm, ..Config::default() };
     let depth = FORCE_N / cell.stiffness + FORCE_N / HAND.stiffness;
-    let steps = ((2.0 + depth) / APPROACH).ceil() as usize;
+    let way = APPROACH * cell.tick_ms;
+    let steps = ((2.0 + depth) / way).ceil() as usize;
     let intent = (0..=steps).map(|step| {
-        let pressed = (APPROACH * step as f32 - 2.0).min(depth);
+        let pressed = (way * step as f32 - 2.0).min(depth);
         held(normal * (RADIUS_MM - pressed), normal)
     });
     let mut device = Simulated::new(config, HAND, Box::new(Replay::new(intent.collect())));
@@ -197,14 +206,16 @@ fn cycle_mm(
     let (mut model, mut out) = (Hooke { stiffness: cell.stiffness }, RigidStep::default());
     let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
     for tick in 0..TICKS {
-        let tool = device.read(tick as f64).tool;
+        let tool = device.read(tick as f64 * f64::from(cell.tick_ms)).tool;
         if tick == 0
             && let Wall::Voxels(_, contact) = &mut wall
         {
             contact.reset(tool.world_from_tool);
         }
-        wall.touch(&tool, normal, &mut out);
-        device.apply(guard.guard(model.wrench(&tool, &out.manifold, TICK_MS), &tool, TICK_MS));
+        wall.touch(&tool, normal, cell.tick_ms, &mut out);
+        let wrench = model.wrench(&tool, &out.manifold, cell.tick_ms);
+        device.apply(guard.guard(wrench, &tool, cell.tick_ms));
+        record(device.position());
         if tick + JUDGED >= TICKS {
             (low, high) = (low.min(device.position()), high.max(device.position()));
         }
@@ -213,9 +224,9 @@ fn cycle_mm(
 }
 
 impl Wall<'_> {
-    fn touch(&mut self, tool: &ToolState, normal: Vec3, out: &mut RigidStep) {
+    fn touch(&mut self, tool: &ToolState, normal: Vec3, tick_ms: f32, out: &mut RigidStep) {
         match self {
-            Self::Voxels(bone, contact) => contact.step(bone, tool, false, TICK_MS, out),
+            Self::Voxels(bone, contact) => contact.step(bone, tool, false, tick_ms, out),
             Self::Exact => {
                 out.clear();
                 let depth_mm = RADIUS_MM - tool.tip().dot(normal);
@@ -242,14 +253,14 @@ mod tests {
     /// The border, from both sides.
     #[test]
     fn within_the_bound_the_recommended_wall_is_as_quiet_as_the_exact_one_and_beyond_it_both_shake() {
-        let (normal, cell) = (normal(), Cell { stiffness: 2.0, damping: 2.0, delay: 0 });
+        let (normal, cell) = (normal(), Cell { stiffness: 2.0, damping: 2.0, delay: 0, tick_ms: TICK_MS });
         assert!(cell.stiffness <= SURE * cell.bound());
         let bone = bone(normal);
         let best = Some(&Method::RECOMMENDED);
         for method in [None, best] {
             assert_eq!(judge(method, &bone, normal, cell, &QUANTUM_MM), Outcome::Works);
         }
-        let stiff = Cell { stiffness: 10.0, damping: 0.5, delay: 5 };
+        let stiff = Cell { stiffness: 10.0, damping: 0.5, delay: 5, tick_ms: TICK_MS };
         for method in [None, best] {
             assert!(judge(method, &bone, normal, stiff, &QUANTUM_MM) != Outcome::Works, "far beyond the bound");
         }

@@ -8,7 +8,7 @@
 mod accuracy;
 pub(super) mod bones;
 mod clearance;
-mod coupling;
+pub(super) mod coupling;
 mod energy;
 mod faults;
 mod hands;
@@ -20,7 +20,7 @@ mod removal;
 mod rivals;
 mod soak;
 pub(super) mod solid;
-mod walls;
+pub(super) mod walls;
 
 pub use bones::head;
 pub use recording::record_all;
@@ -31,7 +31,7 @@ use crate::engine::suite::{Findings, Gate, Row};
 use trepan_rigid::Method;
 
 /// Stiffness that converts depths to forces, N/mm: the thesis's.
-const STIFFNESS: f32 = 2.0;
+pub(super) const STIFFNESS: f32 = 2.0;
 /// Time limit of a tick at 1 kHz, µs.
 const BUDGET_US: f64 = 1000.0;
 

@@ -14,7 +14,7 @@
 //! Held: at rest the proxy's centre is on the side it came from and the normal points back there.
 
 use super::solid::{directions, held, voxels};
-use super::{map_of, passes};
+use super::{STIFFNESS, map_of, passes};
 use crate::engine::picture::{Map, Outcome};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
@@ -109,13 +109,18 @@ pub fn normals(count: usize) -> Vec<Vec3> {
 
 /// A wall whose near face goes through the middle, its near side along `normal`.
 pub fn wall(thick: f64, normal: Vec3) -> BoneVolume {
+    wall_of(thick * VOXEL_MM, VOXEL_MM, normal)
+}
+
+/// A wall of some thickness in voxels of some edge, mm.
+pub fn wall_of(thick_mm: f64, voxel_mm: f64, normal: Vec3) -> BoneVolume {
     let normal = normal.as_dvec3();
-    voxels(EDGE, VOXEL_MM, |p| p.dot(normal).max(-p.dot(normal) - thick * VOXEL_MM))
+    voxels(EDGE, voxel_mm, |p| p.dot(normal).max(-p.dot(normal) - thick_mm))
 }
 
 /// How a method fares in a cell, in the worst of the walls.
 pub fn judge(method: &Method, walls: &[(Vec3, BoneVolume)], cell: Cell) -> Outcome {
-    let worst = |past: f32| walls.iter().find_map(|(normal, wall)| lost(method, wall, *normal, cell, past));
+    let worst = |past: f32| walls.iter().find_map(|(normal, wall)| lost(method, wall, *normal, cell, past, |_| ()));
     match (worst(PRESSED_MM), worst(PIERCED_MM)) {
         (Some(reason), _) => Outcome::Fails(format!("{reason}, when pressed with 3.3 N")),
         (None, Some(reason)) => Outcome::Degrades(format!("{reason}, when the hand goes 6 mm past the face")),
@@ -124,8 +129,15 @@ pub fn judge(method: &Method, walls: &[(Vec3, BoneVolume)], cell: Cell) -> Outco
 }
 
 /// Why the wall does not hold a tool whose foremost point goes `past` mm beyond its face; `None`
-/// when it does.
-fn lost(method: &Method, wall: &BoneVolume, normal: Vec3, cell: Cell, past: f32) -> Option<&'static str> {
+/// when it does. `record` gets the force out of the wall at every tick, N at 2 N/mm.
+pub fn lost(
+    method: &Method,
+    wall: &BoneVolume,
+    normal: Vec3,
+    cell: Cell,
+    past: f32,
+    mut record: impl FnMut(f32),
+) -> Option<&'static str> {
     let (sin, cos) = cell.angle.to_radians().sin_cos();
     let way = normal.any_orthonormal_vector() * sin - normal * cos;
     let end = normal * (cell.radius_mm - past);
@@ -138,6 +150,7 @@ fn lost(method: &Method, wall: &BoneVolume, normal: Vec3, cell: Cell, past: f32)
     for tick in 1..=ticks + REST {
         let left = (length - step * tick as f32).max(0.0);
         contact.step(wall, &held(end - way * left, normal), false, 1.0, &mut out);
+        record(STIFFNESS * out.manifold.depth_mm * out.manifold.normal.dot(normal));
     }
     let proxy = contact.proxy().translation;
     let push = out.manifold.normal.dot(normal);

@@ -89,8 +89,8 @@ fn held(material: Material, u: impl Fn(Vec3) -> Vec3) -> glam::DVec3 {
 }
 
 /// The side stretch at which the side's stress vanishes.
-fn free_side(stress: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (0.5, 1.6);
+pub fn free_side(stress: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.2, 1.6);
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
         if stress(middle) > 0.0 { high = middle } else { low = middle }
@@ -99,7 +99,7 @@ fn free_side(stress: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Principal Kirchhoff stresses `λ_i ∂W/∂λ_i`, MPa, written from the principal stretches.
-fn kirchhoff(material: Material, stretch: [f64; 3]) -> [f64; 3] {
+pub fn kirchhoff(material: Material, stretch: [f64; 3]) -> [f64; 3] {
     let (mu, kappa) = (material.shear_mpa(), material.bulk_mpa());
     let j: f64 = stretch.iter().product();
     let squares = stretch.map(|s| s * s);

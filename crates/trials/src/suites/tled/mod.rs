@@ -1,6 +1,6 @@
 //! Soft-tissue solvers: how right each is and what that costs, and where each fails.
 
-mod closed_forms;
+pub(super) mod closed_forms;
 mod device;
 mod fronts;
 mod locking;
@@ -8,10 +8,10 @@ mod motion;
 pub mod outside;
 mod published;
 mod region;
-mod rivals;
+pub(super) mod rivals;
 mod slender;
 mod speed;
-mod stability;
+pub(super) mod stability;
 
 use super::{Part, Scope};
 use crate::engine::suite::Findings;

@@ -15,24 +15,33 @@ use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 
-const LONGEST_MS: f32 = 4.0;
+/// Longest step of a solver that would take any, ms.
+pub const LONGEST_MS: f32 = 4.0;
 const SECOND_MS: f32 = 1000.0;
 /// Steps by a solver that solves the whole problem in each.
-const STATIC_STEPS: usize = 3;
+pub const STATIC_STEPS: usize = 3;
 /// Further than this no node of the cube may be from rest, mm.
 const BURST_MM: f64 = 60.0;
 /// A node that is still faster than this after a second is shaken, mm/ms.
-const STILL: f32 = 0.02;
+pub const STILL: f32 = 0.02;
 
 /// A solver, made for a body.
 #[derive(Clone, Copy)]
-enum Solver {
+pub enum Solver {
     Tled { cured: bool },
     Rival(Method),
 }
 
 impl Solver {
-    fn build(&self, body: &Body) -> Box<dyn SoftSolver> {
+    /// Every solver with its name.
+    pub fn all() -> Vec<(&'static str, Self)> {
+        let mut all = vec![("tled", Self::Tled { cured: false }), ("tled cured", Self::Tled { cured: true })];
+        all.extend(Method::all().iter().map(|method| (method.name(), Self::Rival(*method))));
+        all
+    }
+
+    /// Makes the solver for a body.
+    pub fn build(&self, body: &Body) -> Box<dyn SoftSolver> {
         match self {
             Self::Tled { cured } => {
                 let config = Config { averaged_pressure: *cured, ..Config::default() };
@@ -42,10 +51,14 @@ impl Solver {
         }
     }
 
-    fn is_static(&self) -> bool {
+    /// Whether a step goes to equilibrium.
+    pub fn is_static(&self) -> bool {
         matches!(self, Self::Rival(method) if method.descriptor().is_static)
     }
 }
+
+/// Sees a solver after every step.
+pub type See<'a> = &'a mut dyn FnMut(&dyn SoftSolver);
 
 type Condition = (&'static str, fn(&Solver) -> Outcome);
 
@@ -66,8 +79,7 @@ const CONDITIONS: [Condition; 12] = [
 
 /// The map of all solvers.
 pub fn run(findings: &mut Findings) {
-    let mut solvers = vec![("tled", Solver::Tled { cured: false }), ("tled cured", Solver::Tled { cured: true })];
-    solvers.extend(Method::all().iter().map(|method| (method.name(), Solver::Rival(*method))));
+    let solvers = Solver::all();
     let names = CONDITIONS.map(|(name, _)| name);
     conditions::judge("Solvers", &names, &solvers, |at, solver| CONDITIONS[at].1(solver), findings);
     let map = findings.maps.last().expect("it was just drawn");
@@ -81,7 +93,8 @@ pub fn run(findings: &mut Findings) {
     }
 }
 
-fn brain() -> Body {
+/// A cube of brain on its base.
+pub fn brain() -> Body {
     cube(4, Material::BRAIN)
 }
 
@@ -94,7 +107,7 @@ fn gravity(times: f32) -> Loads {
 }
 
 /// A plate over the cube's top that stands some depth below it.
-fn pressed(stiffness: f32, depth_mm: f32) -> Loads {
+pub fn pressed(stiffness: f32, depth_mm: f32) -> Loads {
     let (mut contact, body) = (NodalContact::none(), brain());
     boxes::nodes_where(&body.mesh, |p| p.z > 39.9).iter().for_each(|&node| contact.add(node, 1.0));
     contact.normalise();
@@ -105,19 +118,27 @@ fn pressed(stiffness: f32, depth_mm: f32) -> Loads {
 
 /// What a run left.
 #[derive(Default)]
-struct Left {
-    offset_mm: f64,
-    fastest: f32,
-    put_back: u32,
+pub struct Left {
+    /// Furthest that a node is from its rest position, mm.
+    pub offset_mm: f64,
+    /// Speed of the fastest node, mm/ms.
+    pub fastest: f32,
+    /// Nodes that burst and were put back, over all steps.
+    pub put_back: u32,
     held: u32,
+    /// Elements that are inside out at the end.
+    pub inverted: u32,
     skipped_ms: f32,
     converged: bool,
 }
 
-fn left(solver: &mut dyn SoftSolver, body: &Body, loads: &Loads, dt_ms: f32, steps: usize) -> Left {
+/// Makes so many steps under steady loads.
+pub fn left(solver: &mut dyn SoftSolver, body: &Body, loads: &Loads, dt_ms: f32, steps: usize, see: See) -> Left {
     let mut left = Left::default();
     for _ in 0..steps {
         let report = solver.step(loads, dt_ms);
+        see(solver);
+        left.inverted = report.inverted;
         left.put_back = left.put_back.saturating_add(report.non_finite);
         left.held = left.held.saturating_add(report.limited);
         left.skipped_ms += report.skipped_ms;
@@ -128,7 +149,8 @@ fn left(solver: &mut dyn SoftSolver, body: &Body, loads: &Loads, dt_ms: f32, ste
     left
 }
 
-fn steps(of: &Solver, dt_ms: f32) -> usize {
+/// Steps of a second.
+pub fn steps(of: &Solver, dt_ms: f32) -> usize {
     if of.is_static() { STATIC_STEPS } else { (SECOND_MS / dt_ms).ceil() as usize }
 }
 
@@ -136,7 +158,7 @@ fn steps(of: &Solver, dt_ms: f32) -> usize {
 fn endured(of: &Solver, body: &Body, loads: &Loads, step_share: f32, most_mm: f64) -> Outcome {
     let mut solver = of.build(body);
     let dt_ms = step_share * solver.stable_dt_ms().min(LONGEST_MS);
-    let left = left(&mut *solver, body, loads, dt_ms, steps(of, dt_ms));
+    let left = left(&mut *solver, body, loads, dt_ms, steps(of, dt_ms), &mut |_| ());
     match () {
         () if !left.offset_mm.is_finite() => Outcome::Fails("not a number".into()),
         () if left.put_back > 0 => Outcome::Fails("nodes burst and are put back".into()),
@@ -152,14 +174,22 @@ fn endured(of: &Solver, body: &Body, loads: &Loads, step_share: f32, most_mm: f6
 /// A plate comes down to a depth at a speed, mm/ms, stays for half a second, and is gone: back at
 /// rest two seconds later.
 fn let_go(of: &Solver, depth_mm: f32, speed: f32) -> Outcome {
+    let_go_seen(of, depth_mm, speed, &mut |_| ())
+}
+
+/// The same; `see` sees the solver after every step.
+pub fn let_go_seen(of: &Solver, depth_mm: f32, speed: f32, see: See) -> Outcome {
     let body = brain();
     let mut solver = of.build(&body);
     let dt_ms = solver.stable_dt_ms().min(LONGEST_MS);
     let half = steps(of, dt_ms).div_ceil(2);
     let depths = (1..).map(|step| speed * dt_ms * step as f32).take_while(|&depth| depth < depth_mm);
-    depths.take(half).for_each(|depth| _ = solver.step(&pressed(1.0, depth), dt_ms));
-    let flat = left(&mut *solver, &body, &pressed(1.0, depth_mm), dt_ms, half);
-    let after = left(&mut *solver, &body, &Loads::default(), dt_ms, 4 * half);
+    for depth in depths.take(half) {
+        solver.step(&pressed(1.0, depth), dt_ms);
+        see(&*solver);
+    }
+    let flat = left(&mut *solver, &body, &pressed(1.0, depth_mm), dt_ms, half, see);
+    let after = left(&mut *solver, &body, &Loads::default(), dt_ms, 4 * half, see);
     match () {
         () if !after.offset_mm.is_finite() || flat.put_back + after.put_back > 0 => Outcome::Fails("bursts".into()),
         () if after.offset_mm > 1.0 => Outcome::Fails("does not come back".into()),
@@ -174,7 +204,7 @@ fn no_numbers(of: &Solver) -> Outcome {
     let dt_ms = solver.stable_dt_ms().min(LONGEST_MS);
     solver.step(&Loads { gravity: Vec3::NAN, ..Loads::default() }, dt_ms);
     [0.0, -1.0, f32::NAN, f32::INFINITY].into_iter().for_each(|dt_ms| _ = solver.step(&gravity(0.1), dt_ms));
-    let after = left(&mut *solver, &body, &Loads::default(), dt_ms, 2 * steps(of, dt_ms));
+    let after = left(&mut *solver, &body, &Loads::default(), dt_ms, 2 * steps(of, dt_ms), &mut |_| ());
     match () {
         () if !after.offset_mm.is_finite() => Outcome::Fails("not a number ever after".into()),
         () if after.offset_mm > 0.2 => Outcome::Degrades("not back at rest two seconds later".into()),

@@ -54,7 +54,7 @@ pub fn draw(findings: &mut Findings) {
     findings.maps.extend(maps);
 }
 
-pub(super) fn cube(cells: usize, material: Material) -> Body {
+pub fn cube(cells: usize, material: Material) -> Body {
     let mesh = boxes::split_box([cells; 3], Vec3::splat(40.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
     Body::uniform(mesh, fixed, material)
@@ -65,7 +65,7 @@ fn solver(body: &Body, config: Config) -> Tled {
 }
 
 /// Furthest that a node is from its rest position, mm; not a number where one is nowhere.
-pub(super) fn offset(solver: &dyn SoftSolver, body: &Body) -> f64 {
+pub fn offset(solver: &dyn SoftSolver, body: &Body) -> f64 {
     let all = solver.positions().iter().zip(&body.mesh.positions).map(|(a, b)| f64::from(a.distance(*b)));
     all.fold(0.0, |most, d| if d.is_nan() || most.is_nan() { f64::NAN } else { most.max(d) })
 }

@@ -9,7 +9,7 @@ use trepan_geometry::{Aabb, Vec3};
 use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
 
 /// Prices of a usual machine, µs: ratios decide, and they are much the same on all.
-const PRICES: Prices = Prices { fixed: 0.0, visit: 0.004, doubt: 0.006, test: 0.02 };
+pub const PRICES: Prices = Prices { fixed: 0.0, visit: 0.004, doubt: 0.006, test: 0.02 };
 /// The thesis's share of boxes that touch nothing.
 const NO_CONTACT: f64 = 0.99;
 /// Sizes that a tuned formula tries beside its first seven.
@@ -19,7 +19,7 @@ const DEGRADES: f64 = 1.3;
 const FAILS: f64 = 3.0;
 
 /// Boxes and particles.
-type Scene = (Vec<Aabb>, Vec<Vec3>);
+pub type Scene = (Vec<Aabb>, Vec<Vec3>);
 type Condition = (&'static str, fn() -> Scene);
 
 const CONDITIONS: [Condition; 9] = [
@@ -50,71 +50,82 @@ pub fn run(findings: &mut Findings) {
 }
 
 /// Boxes on a lattice that fills a cube of `edge` mm, each of an edge that its number says.
-fn row_of_boxes(edge: usize, size: impl Fn(usize) -> f32) -> Vec<Aabb> {
+pub fn row_of_boxes(edge: usize, size: impl Fn(usize) -> f32) -> Vec<Aabb> {
     let place = |n: usize| Vec3::new((n % edge) as f32, (n / edge % edge) as f32, (n / (edge * edge)) as f32);
     (0..edge.pow(3)).map(|n| Aabb { min: place(n), max: place(n) + size(n) }).collect()
 }
 
-fn cloud(count: usize, edge: f32) -> Vec<Vec3> {
+/// Particles anywhere in a cube, mm.
+pub fn cloud(count: usize, edge: f32) -> Vec<Vec3> {
     let mut random = fastrand::Rng::with_seed(3);
     (0..count).map(|_| Vec3::new(random.f32(), random.f32(), random.f32()) * edge).collect()
 }
 
-/// Counts of work at the rule's size against the least over a ladder of sizes.
-fn verdict((boxes, particles): &Scene, rule: &str) -> Outcome {
-    let edges = boxes.iter().map(|b| f64::from(b.size().max_element())).sum::<f64>() / boxes.len() as f64;
-    let reach = 20.0 * edges;
-    let size = match rule {
-        OURS | "expected work alone" => {
-            match Expected::of(boxes, particles, reach).and_then(|e| e.best(&PRICES, 0.05 * edges)) {
-                Ok(size) => size,
-                Err(fault) => return Outcome::Refused(fault.to_string()),
-            }
-        }
-        "mean edge" | "mean edge, tuned" => edges,
-        "1.45 x mean edge" => 1.45 * edges,
-        "512 voxels" | "512 voxels, tuned" => edge_of_512_voxels(boxes),
+/// Size that a rule takes at some prices, mm, or why it takes none. A tuned formula is tuned by
+/// counts of work in place of times.
+pub fn size_by(scene: &Scene, rule: &str, prices: &Prices) -> Result<f64, String> {
+    if let Some(formula) = rule.strip_suffix(", tuned") {
+        return Ok(tuned_by_work(scene, size_by(scene, formula, prices)?));
+    }
+    let (boxes, particles) = scene;
+    let edges = edges(boxes);
+    match rule {
+        OURS | "expected work alone" => Expected::of(boxes, particles, REACH * edges)
+            .and_then(|expected| expected.best(prices, 0.05 * edges))
+            .map_err(|fault| fault.to_string()),
+        "mean edge" => Ok(edges),
+        "1.45 x mean edge" => Ok(1.45 * edges),
+        "512 voxels" => Ok(edge_of_512_voxels(boxes)),
         _ => {
-            let model =
-                if rule.starts_with("thesis analytic") { Ok(CostModel::default()) } else { PRICES.model(NO_CONTACT) };
+            let model = if rule == "thesis analytic" { Ok(CostModel::default()) } else { prices.model(NO_CONTACT) };
             let all = Measures {
                 elements: boxes.len(),
                 longest_edge_mm: edges,
                 mean_edge_mm: edges,
                 facet_mm2: 0.5 * edges * edges,
             };
-            let size = all.checked().and_then(|m| model.and_then(|model| model.analytic(&m)));
-            match size {
-                Ok(size) => size,
-                Err(fault) => return Outcome::Refused(fault.to_string()),
-            }
+            let size = all.checked().and_then(|measures| model.and_then(|model| model.analytic(&measures)));
+            size.map_err(|fault| fault.to_string())
         }
-    };
-    judged(boxes, particles, if rule.ends_with("tuned") { tuned_by_work(boxes, particles, size) } else { size }, edges)
+    }
 }
 
-/// The tuned size by counts of work in place of times; the formula's where a grid is refused.
-fn tuned_by_work(boxes: &[Aabb], particles: &[Vec3], formula_mm: f64) -> f64 {
+/// The tuned size by counts of work; the formula's where a grid is refused.
+fn tuned_by_work(scene: &Scene, formula_mm: f64) -> f64 {
     let cheapest = |cells: &[f64]| {
-        let work: Vec<f64> = cells.iter().map(|cell| work(boxes, particles, *cell).unwrap_or(f64::INFINITY)).collect();
+        let work: Vec<f64> = cells.iter().map(|cell| work(scene, *cell).unwrap_or(f64::INFINITY)).collect();
         (0..cells.len()).min_by(|&a, &b| work[a].total_cmp(&work[b]))
     };
     timing::tuned(formula_mm, CANDIDATES, cheapest).unwrap_or(formula_mm)
 }
 
-/// Work of a pass at a size, µs.
-fn work(boxes: &[Aabb], particles: &[Vec3], size: f64) -> Result<f64, String> {
-    let found = counts::grid(boxes, particles, size).map_err(|fault| fault.to_string())?;
+/// Largest size that is looked at, in mean edges.
+const REACH: f64 = 20.0;
+
+fn edges(boxes: &[Aabb]) -> f64 {
+    boxes.iter().map(|b| f64::from(b.size().max_element())).sum::<f64>() / boxes.len() as f64
+}
+
+/// Work of a grid of some cell, µs at the usual prices, or why there can be none.
+pub fn work((boxes, particles): &Scene, cell_mm: f64) -> Result<f64, String> {
+    let found = counts::grid(boxes, particles, cell_mm).map_err(|fault| fault.to_string())?;
     Ok(PRICES.visit * found.visits as f64 + PRICES.test * found.tests as f64)
 }
 
-fn judged(boxes: &[Aabb], particles: &[Vec3], size: f64, edges: f64) -> Outcome {
-    let at = |size: f64| work(boxes, particles, size);
-    let own = match at(size) {
-        Ok(work) => work,
+/// Work over a ladder of cells: cell, mm, and µs.
+pub fn ladder(scene: &Scene) -> Vec<(f64, f64)> {
+    let edges = edges(&scene.0);
+    let cells = (0..18).map(|n| 0.3 * edges * 1.3f64.powi(n));
+    cells.filter_map(|cell| Some((cell, work(scene, cell).ok()?))).collect()
+}
+
+/// Counts of work at the rule's size against the least over a ladder of sizes.
+fn verdict(scene: &Scene, rule: &str) -> Outcome {
+    let (size, own) = match size_by(scene, rule, &PRICES).and_then(|size| Ok((size, work(scene, size)?))) {
+        Ok(found) => found,
         Err(fault) => return Outcome::Refused(fault),
     };
-    let best = (0..18).filter_map(|n| at(0.3 * edges * 1.3f64.powi(n)).ok()).fold(f64::INFINITY, f64::min);
+    let best = ladder(scene).into_iter().map(|(_, work)| work).fold(f64::INFINITY, f64::min);
     match own / best {
         _ if !size.is_finite() => Outcome::Fails("not a number".into()),
         ratio if ratio <= DEGRADES || best == 0.0 => Outcome::Works,
