@@ -323,12 +323,13 @@ fn step(pressed: &Pressed, averaged_pressure: bool, truth: &Solution) -> Result<
     Ok((force_n, [truth.error_percent(moved), 100.0 * (force_n / truth.force_n - 1.0).abs()]))
 }
 
-/// Meshes of the truth for block and brain: coarser, finer.
-const TRUTH_SIZES: [[Size; 2]; 2] = {
+/// Meshes of the truth for block and brain, pressed and slid: coarser, finer.
+const TRUTH_SIZES: [[[Size; 2]; 2]; 2] = {
     const fn of(count: usize, halvings: u32) -> Size {
         Size { count, halvings, of_truth: true }
     }
-    [[of(10, 0), of(14, 0)], [of(4_000, 3), of(9_000, 3)]]
+    let brain = [of(4_000, 3), of(9_000, 3)];
+    [[[of(10, 0), of(12, 0)], [of(8, 0), of(10, 0)]], [brain, brain]]
 };
 
 /// A scene for `press.py`, by the name of its file.
@@ -347,7 +348,7 @@ pub fn exports() -> Result<Vec<Export>> {
     let shapes = [Shape::block()?, Shape::brain()?];
     let mut exports = Vec::new();
     for (shape, sizes) in shapes.iter().zip(TRUTH_SIZES) {
-        for slid in [false, true] {
+        for (slid, sizes) in [false, true].into_iter().zip(sizes) {
             for (size, which) in sizes.into_iter().zip(["coarser", "finer"]) {
                 let pressed = shape.pressed(size, slid)?;
                 exports.push(Export {
