@@ -54,6 +54,8 @@ use wide::f32x8;
 const HALF_HU: f32 = 500.0;
 /// Share of a voxel for each HU.
 const PER_HU: f32 = 0.5 / HALF_HU;
+/// Least distance of the centre of mass from the ball's that has a direction, voxels.
+const LEAST_OFF: f32 = 1e-3;
 /// Most voxels that are read in one go.
 const ROW: usize = 32;
 /// Most voxels that a burr wears at once.
@@ -138,7 +140,9 @@ impl PenaltyProbe for Sum {
         out.points_in_contact = found.voxels;
         // Past half of the ball there is no flat bone that would press on it.
         let cap_mm = (cap_height(found.volume, radius) * spacing).min(tool.tip_radius_mm);
-        let felt = answer(-found.moment, cap_mm * (cap_mm / REFERENCE_MM).sqrt(), out);
+        // A centre of mass so near to the ball's is rounding: there is no way to push.
+        let push = if found.moment.length() > LEAST_OFF * found.volume { -found.moment } else { Vec3::ZERO };
+        let felt = answer(push, cap_mm * (cap_mm / REFERENCE_MM).sqrt(), out);
         if let Some(Felt { normal, depth_mm, .. }) = felt {
             out.manifold.push(Contact { point: tip - tool.tip_radius_mm * normal, normal, depth_mm });
         }

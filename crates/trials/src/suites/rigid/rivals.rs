@@ -27,7 +27,7 @@ use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use glam::DVec3;
 use trepan_geometry::{Tool, Vec3};
-use trepan_rigid::rivals::{burr_and_shaft, centre_line, thesis};
+use trepan_rigid::rivals::{burr_and_shaft, centre_line, pointshell, thesis};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::BoneVolume;
 
@@ -64,7 +64,11 @@ pub fn judge(findings: &mut Findings) {
     let has_gain = |row: &&Row| row.scene == SCENE && !plain.iter().any(|method| method.name() == row.method);
     let off = |row: &Row| 100.0 * (row.metrics["stiffness_n_per_mm"] / f64::from(STIFFNESS) - 1.0).abs();
     let gate = |row: &Row| {
-        Gate::at_most(format!("{}: stiffness at 0.5 mm off k, percent", row.method), off(row), MOST_PERCENT)
+        let limit = format!("{}: stiffness at 0.5 mm off k, percent", row.method);
+        let gate = Gate::at_most(limit, off(row), MOST_PERCENT);
+        // The average pushes with all of its stiffness before the ten points touch that its closed
+        // form counts on.
+        if row.method == pointshell::AVERAGE.name { gate.or_known_gap() } else { gate }
     };
     let gates: Vec<Gate> = findings.rows.iter().filter(has_gain).map(gate).collect();
     findings.gates.extend(gates);
