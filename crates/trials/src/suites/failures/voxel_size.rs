@@ -44,7 +44,7 @@ const CONDITIONS: [Condition<&str>; 7] = [
     condition("particles", "1", PARTICLES, [2.0, 16_000.0], |rule, count| {
         grid(rule, (row_of_boxes(EDGE, |_| 1.0), cloud(count as usize, EDGE as f32)))
     }),
-    condition("elements along an axis", "1", EDGE as f64, [1.0, 24.0], |rule, edge| {
+    condition("elements along an axis", "1", EDGE as f64, [1.0, EDGE as f64], |rule, edge| {
         let edge = edge.round();
         let particles = PARTICLES * (edge / EDGE as f64).powi(3);
         grid(rule, (row_of_boxes(edge as usize, |_| 1.0), cloud(particles.ceil() as usize, edge as f32)))
