@@ -14,6 +14,8 @@ use std::ops::Range;
 const SIZE: (u32, u32) = (960, 300);
 /// Room for the legend right of the lines, as a share of their width.
 const LEGEND: f64 = 0.24;
+/// Heights of the first line that fit above and below it where a chart is around it.
+const ROOM: f64 = 3.0;
 /// Width of the legend's sample of a line, px.
 const SAMPLE: i32 = 16;
 
@@ -30,7 +32,12 @@ pub fn svg(series: &Series) -> Result<String, Fault> {
     let x = span(&mut all().map(|point| point.0));
     let wide = x.start..x.end + LEGEND * (x.end - x.start);
     let limit = series.limit.as_ref().map(|(value, _)| *value).filter(|value| is_drawn(*value));
-    let y = span(&mut all().map(|point| point.1).chain(limit));
+    let mut y = span(&mut all().map(|point| point.1).chain(limit));
+    if let (true, Some((_, first))) = (series.around_first, series.lines.first()) {
+        let own = span(&mut first.iter().map(|point| point.1).filter(|y| is_drawn(*y)));
+        let room = ROOM * (own.end - own.start).max(1e-3 * own.end.abs()).max(1e-9);
+        y = y.start.max(own.start - room)..y.end.min(own.end + room);
+    }
     if x.start >= x.end {
         return Err(format!("{}: no line has two finite points", series.title).into());
     }
@@ -39,17 +46,25 @@ pub fn svg(series: &Series) -> Result<String, Fault> {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
         if series.logarithmic {
-            draw(series, &root, &wide, (0.8 * y.start..1.4 * y.end).log_scale(), limit)?;
+            let y = 0.8 * y.start..1.4 * y.end;
+            draw(series, &root, &wide, (&y, y.clone().log_scale()), limit)?;
         } else {
             let room = 0.06 * (y.end - y.start).max(1e-6);
-            draw(series, &root, &wide, y.start - room..y.end + room, limit)?;
+            let y = y.start - room..y.end + room;
+            draw(series, &root, &wide, (&y, y.clone()), limit)?;
         }
         root.present()?;
     }
     Ok(svg)
 }
 
-fn draw<Y>(series: &Series, root: &Root<'_>, x: &Range<f64>, y: Y, limit: Option<f64>) -> Result<(), Fault>
+fn draw<Y>(
+    series: &Series,
+    root: &Root<'_>,
+    x: &Range<f64>,
+    (ends, y): (&Range<f64>, Y),
+    limit: Option<f64>,
+) -> Result<(), Fault>
 where
     Y: AsRangedCoord<Value = f64>,
     Y::CoordDescType: ValueFormatter<f64>,
@@ -71,7 +86,8 @@ where
     for (at, (name, points)) in series.lines.iter().enumerate() {
         let colour = COLOURS[at % COLOURS.len()];
         let seen = points.iter().copied().filter(|(_, y)| y.is_finite() && (!series.logarithmic || *y > 0.0));
-        axes.draw_series(LineSeries::new(seen, colour))?
+        let within = seen.map(|(x, y)| (x, y.clamp(ends.start, ends.end)));
+        axes.draw_series(LineSeries::new(within, colour))?
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + SAMPLE, y)], colour.stroke_width(3)));
     }
@@ -106,7 +122,7 @@ mod tests {
             y: "depth, mm".into(),
             lines: vec![line("thesis", 1.0), line("ours", -0.5)],
             limit: Some((2.0, "limit".into())),
-            logarithmic: false,
+            ..Series::default()
         };
         for series in [series.clone(), Series { logarithmic: true, ..series.clone() }] {
             let svg = svg(&series).unwrap();
@@ -114,6 +130,9 @@ mod tests {
                 assert!(svg.contains(text), "{text} is missing");
             }
         }
+        let burst = ("bursts".to_string(), vec![(0.0, 0.0), (8.0, 1e30)]);
+        let around_first = Series { lines: vec![line("works", 1.0), burst], around_first: true, ..series.clone() };
+        assert!(svg(&around_first).unwrap().contains("30"), "the axis ends near the first line");
         assert!(svg(&Series { lines: vec![], ..series }).is_err());
     }
 }

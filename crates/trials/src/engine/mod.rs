@@ -19,5 +19,4 @@ pub mod row;
 pub mod store;
 pub mod suite;
 pub mod timer;
-pub mod trace;
 pub mod worst;

@@ -23,7 +23,6 @@ struct Section<'a> {
     command_of_part: String,
     charts: Vec<Drawn>,
     series: Vec<Drawn>,
-    traces: Vec<Drawn>,
     maps: Vec<Figure<'a>>,
     /// Number of map cells that work, degrade, fail and are refused.
     grades: [usize; 4],
@@ -75,7 +74,6 @@ impl<'a> Section<'a> {
             command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
             charts: charts(suite, report),
             series: found.series.iter().map(|series| Drawn::of(curve::svg(series))).collect(),
-            traces: found.traces.iter().map(|trace| Drawn::of(trace.svg())).collect(),
             maps: found.maps.iter().map(Figure::of).collect(),
             grades,
             tables: found.rows.chunk_by(|a, b| a.metrics.keys().eq(b.metrics.keys())).collect(),
@@ -86,7 +84,7 @@ impl<'a> Section<'a> {
 
 fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
     let own = &report.findings.charts;
-    let needed = own.is_empty() && report.findings.series.is_empty() && report.findings.traces.is_empty();
+    let needed = own.is_empty() && report.findings.series.is_empty();
     let drawn = if needed { vec![chart_of_all(suite, report)] } else { own.clone() };
     let mut methods: Vec<&str> = Vec::new();
     for mark in drawn.iter().flat_map(|chart| &chart.marks) {

@@ -114,9 +114,13 @@ pub struct Series {
     pub lines: Vec<Line>,
     /// Limit across the vertical axis with its name.
     pub limit: Option<(f64, String)>,
+    /// Whether the vertical axis ends three heights of the first line beyond it, so that a line that
+    /// bursts leaves the picture.
+    #[serde(default)]
+    pub around_first: bool,
 }
 
-/// Most ranges of frames in a thinned line; each keeps its least and its largest value.
+/// Most ranges in a thinned line; each keeps its least and its largest value.
 const RANGES: usize = 240;
 
 impl Series {
@@ -127,8 +131,19 @@ impl Series {
         y: &str,
         lines: impl IntoIterator<Item = (String, &'a [V])>,
     ) -> Self {
-        let lines = lines.into_iter().map(|(name, values)| (name, thinned(values))).collect();
-        Self { title: title.into(), x: "frame".into(), y: y.into(), lines, ..Self::default() }
+        let points = |values: &[V]| values.iter().enumerate().map(|(n, value)| (n as f64, (*value).into())).collect();
+        Self::over(title, ["frame", y], lines.into_iter().map(|(name, values)| (name, points(values))))
+    }
+
+    /// Creates a chart of lines over a quantity; `axes`: the quantities with their units. Points that
+    /// are not finite are left out, and long lines thinned as over frames.
+    pub fn over(
+        title: impl Into<String>,
+        axes: [&str; 2],
+        lines: impl IntoIterator<Item = (String, Vec<(f64, f64)>)>,
+    ) -> Self {
+        let lines = lines.into_iter().map(|(name, points)| (name, thinned(&points))).collect();
+        Self { title: title.into(), x: axes[0].into(), y: axes[1].into(), lines, ..Self::default() }
     }
 
     /// The same on a logarithmic vertical axis with a limit.
@@ -148,21 +163,19 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-/// Points of a line over frames; each range of frames keeps its least and its largest value.
-fn thinned<V: Into<f64> + Copy>(values: &[V]) -> Vec<(f64, f64)> {
-    let range = values.len().div_ceil(RANGES).max(1);
-    let mut points = Vec::new();
-    for (number, range_of) in values.chunks(range).enumerate() {
-        let at = |(n, value): (usize, &V)| ((number * range + n) as f64, rounded((*value).into()));
-        let finite = || range_of.iter().enumerate().map(at).filter(|(_, value): &(f64, f64)| value.is_finite());
+/// Finite points of a line; each range keeps its least and its largest value.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut kept = Vec::new();
+    for range in points.chunks(points.len().div_ceil(RANGES).max(1)) {
+        let finite = || range.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).map(|(x, y)| (*x, rounded(*y)));
         let least = finite().min_by(|a, b| a.1.total_cmp(&b.1));
         let most = finite().max_by(|a, b| a.1.total_cmp(&b.1));
         let mut both: Vec<(f64, f64)> = least.into_iter().chain(most).collect();
         both.sort_by(|a, b| a.0.total_cmp(&b.0));
         both.dedup();
-        points.extend(both);
+        kept.extend(both);
     }
-    points
+    kept
 }
 
 /// Picture that a run made, for a suite's page.

@@ -7,7 +7,6 @@
 use crate::engine::picture::{Chart, Map as StabilityMap, Series, Snapshot, Table};
 use crate::engine::row::number;
 pub use crate::engine::row::{Row, shown};
-use crate::engine::trace::Trace;
 use serde::{Deserialize, Serialize};
 
 /// Allowed side of a limit.
@@ -74,9 +73,6 @@ pub struct Findings {
     pub charts: Vec<Chart>,
     /// Maps for the page.
     pub maps: Vec<StabilityMap>,
-    /// Traces for the page.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub traces: Vec<Trace>,
     /// Tables for the page.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<Table>,
@@ -101,7 +97,6 @@ impl Findings {
         self.gates.append(&mut other.gates);
         self.charts.append(&mut other.charts);
         self.maps.append(&mut other.maps);
-        self.traces.append(&mut other.traces);
         self.tables.append(&mut other.tables);
         self.series.append(&mut other.series);
         self.pictures.append(&mut other.pictures);

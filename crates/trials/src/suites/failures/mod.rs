@@ -22,9 +22,9 @@ mod voxel_size;
 
 use super::{Part, Scope};
 use crate::engine::nearest::{Condition, Failure, Tried};
+use crate::engine::picture::Series;
 use crate::engine::report::Report;
 use crate::engine::suite::{Findings, Row};
-use crate::engine::trace::{Run, Trace};
 use serde_json::Value;
 
 /// Distance between trials on the way outwards, octaves: of a quick run and of a full one.
@@ -114,7 +114,7 @@ impl<M> Family<M> {
         let mut traced: Vec<_> = found.iter().filter_map(|(of, failure)| Some((*of, failure.as_ref()?))).collect();
         traced.sort_by(|a, b| a.1.octaves().total_cmp(&b.1.octaves()));
         let kept = if candidate.standing == Standing::Own { traced.len() } else { 1 };
-        findings.traces.extend(traced.iter().take(kept).map(|(of, failure)| {
+        findings.series.extend(traced.iter().take(kept).map(|(of, failure)| {
             let whose = title(self.suite, &candidate.name);
             trace(&whose, of, failure)
         }));
@@ -152,16 +152,14 @@ fn title(suite: &str, method: &str) -> String {
     format!("{suite}: {method}, ")
 }
 
-fn trace<M>(whose: &str, condition: &Condition<M>, failure: &Failure) -> Trace {
-    let run = |word: &str, tried: &Tried| {
-        Run::new(format!("{word} at {}", amount(tried.value, condition.unit)), &tried.trace)
-    };
-    let works = failure.works.iter().map(|works| run("works", works));
-    Trace {
-        title: format!("{whose}{}: {}", condition.name, failure.fault),
-        axes: condition.axes.map(String::from),
-        runs: works.chain([run("fails", &failure.at)]).collect(),
-    }
+/// Lines of what was recorded at the last value that works and at the one that fails.
+fn trace<M>(whose: &str, condition: &Condition<M>, failure: &Failure) -> Series {
+    let line =
+        |word: &str, tried: &Tried| (format!("{word} at {}", amount(tried.value, condition.unit)), tried.trace.clone());
+    let works = failure.works.iter().map(|works| line("works", works));
+    let title = format!("{whose}{}: {}", condition.name, failure.fault);
+    let lines = works.chain([line("fails", &failure.at)]);
+    Series { around_first: true, ..Series::over(title, condition.axes, lines) }
 }
 
 /// A number and its unit.

@@ -139,7 +139,7 @@ pub fn judge(families: &[Listed], findings: &mut Findings) {
         .filter(|line| line.standing() == Standing::Own)
         .map(|line| title(text(line.row, "family"), &line.row.method))
         .collect();
-    findings.traces.sort_by_key(|trace| !owned.iter().any(|own| trace.title.starts_with(own)));
+    findings.series.sort_by_key(|trace| !owned.iter().any(|own| trace.title.starts_with(own)));
     let mut own: Vec<Line> = rows.iter().map(|row| Line { row, of: 1 }).collect();
     own.retain(|line| line.standing() == Standing::Own && !text(line.row, "family").is_empty());
     own.sort_by(|a, b| a.octaves().total_cmp(&b.octaves()));
@@ -158,7 +158,7 @@ pub fn judge(families: &[Listed], findings: &mut Findings) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::trace::Trace;
+    use crate::engine::picture::Series;
 
     fn row(method: &str, standing: &str, condition: &str, factor: Option<f64>) -> Row {
         let row = Row::new(condition, method).with("family", "rigid").with("standing", standing);
@@ -181,8 +181,8 @@ mod tests {
             ..Findings::default()
         };
         let methods = ["rival", "ours", "new"].map(String::from).to_vec();
-        let trace = |title: &str| Trace { title: title.into(), axes: ["x", "y"].map(String::from), runs: vec![] };
-        findings.traces = ["rigid: rival, size: bends", "rigid: ours, edge: breaks"].map(trace).to_vec();
+        let trace = |title: &str| Series { title: title.into(), ..Series::default() };
+        findings.series = ["rigid: rival, size: bends", "rigid: ours, edge: breaks"].map(trace).to_vec();
         judge(&[Listed { suite: "rigid", criterion: "it breaks", methods }], &mut findings);
         let table = &findings.tables[0].rows;
         assert_eq!((table.len(), table[0][1].as_str(), table[0][3].as_str()), (2, "ours", "edge"));
@@ -195,7 +195,7 @@ mod tests {
             [cell("edge", "ours"), cell("size", "ours"), cell("size", "rival"), cell("size", "new")],
             [1, 0, 2, 3]
         );
-        assert_eq!(findings.traces[0].title, "rigid: ours, edge: breaks");
+        assert_eq!(findings.series[0].title, "rigid: ours, edge: breaks");
         assert_eq!(findings.tables[1].rows[2][5], "none from 1 to 9 mm");
         assert_eq!(findings.conclusions[1], "rigid: new has no nearest failure");
     }

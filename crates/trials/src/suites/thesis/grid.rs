@@ -275,7 +275,7 @@ impl Measured {
             y: "time, ms".into(),
             logarithmic: true,
             lines: curves.into_iter().chain(rules.map(rule)).collect(),
-            limit: None,
+            ..Series::default()
         }
     }
 }
