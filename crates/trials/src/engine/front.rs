@@ -1,7 +1,9 @@
 //! Pareto front: the rows that no other row beats in both cost and error.
 
-use crate::engine::picture::Chart;
 use crate::engine::row::Row;
+
+/// Change of a time within which two runs count as equal, as a share.
+pub const SPREAD: f64 = 0.15;
 
 /// Number of rows of a scene that beat a method's row in both metrics, in cost by more than the
 /// spread of two runs. Rows with a missing or non-finite metric are ignored.
@@ -13,7 +15,7 @@ pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &st
     in_scene()
         .filter(|row| row.method != method)
         .filter_map(pair)
-        .filter(|other| other.0 < own.0 * (1.0 - Chart::SPREAD) && other.1 < own.1)
+        .filter(|other| other.0 < own.0 * (1.0 - SPREAD) && other.1 < own.1)
         .count()
 }
 

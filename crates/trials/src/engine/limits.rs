@@ -102,7 +102,7 @@ fn within(side: Side, value: f64, limit: f64) -> bool {
 }
 
 impl Register {
-    /// Reads the register of a suite and what all suites share; an absent file is an empty register.
+    /// Reads the register of a suite and what all suites share; an absent file is an empty one.
     pub fn of(suite: &str) -> Result<Self> {
         let mut register = Self::read(suite)?;
         register.limits.extend(Self::read(COMMON)?.limits);

@@ -121,20 +121,12 @@ mod tests {
     use crate::engine::suite::{Findings, Gate};
     use std::collections::BTreeMap;
 
-    #[test]
-    fn the_page_shows_rows_limits_maps_and_charts_and_escapes_text() {
-        let suite = Suite {
-            name: "toy",
-            question: "is a < b",
-            chart: ("tick_p50_us", "depth_error_mm"),
-            parts: |_| vec![],
-            judge: nothing_more,
-        };
+    fn toy() -> Findings {
         let row = |n| {
             let row = Row::new(format!("scene <{n}>"), "a & b").with("points", n);
             row.metric("tick_p50_us", f64::from(n)).metric("depth_error_mm", 0.5 / f64::from(n))
         };
-        let findings = Findings {
+        Findings {
             rows: vec![row(1), row(2), Row::new("other", "c").metric("cost_s", f64::NAN)],
             gates: vec![
                 Gate::at_most("depth", 0.3, 0.2),
@@ -157,7 +149,19 @@ mod tests {
             conclusions: vec!["a=1 changes & costs".into()],
             regressions: vec!["WORSE: a map".into()],
             ..Findings::default()
+        }
+    }
+
+    #[test]
+    fn the_page_shows_rows_limits_maps_and_charts_and_escapes_text() {
+        let suite = Suite {
+            name: "toy",
+            question: "is a < b",
+            chart: ("tick_p50_us", "depth_error_mm"),
+            parts: |_| vec![],
+            judge: nothing_more,
         };
+        let findings = toy();
         let making = Making::here(Scope { quick: true, seed: 1 });
         let report = Report {
             suite: "toy".into(),

@@ -5,7 +5,7 @@
 //! logarithmic. Costs below a thousandth of a unit and errors below a hundred-thousandth are drawn
 //! at that limit.
 
-use crate::engine::front::front;
+use crate::engine::front::{self, front};
 use crate::engine::row::number;
 use serde::{Deserialize, Serialize};
 
@@ -59,7 +59,7 @@ impl Chart {
 
     /// Relative difference in cost between two runs of one commit on a shared machine that does not
     /// change a Pareto front.
-    pub const SPREAD: f64 = 0.15;
+    pub const SPREAD: f64 = front::SPREAD;
 
     /// Methods with a mark on the Pareto front.
     pub fn on_front(&self) -> Vec<String> {
@@ -114,8 +114,8 @@ pub struct Series {
     pub lines: Vec<Line>,
     /// Limit across the vertical axis with its name.
     pub limit: Option<(f64, String)>,
-    /// Whether the vertical axis ends three heights of the first line beyond it, so that a line that
-    /// bursts leaves the picture.
+    /// Whether the vertical axis ends three heights of the first line beyond it, so that a line
+    /// that bursts leaves the picture.
     #[serde(default)]
     pub around_first: bool,
 }
@@ -135,8 +135,8 @@ impl Series {
         Self::over(title, ["frame", y], lines.into_iter().map(|(name, values)| (name, points(values))))
     }
 
-    /// Creates a chart of lines over a quantity; `axes`: the quantities with their units. Points that
-    /// are not finite are left out, and long lines thinned as over frames.
+    /// Creates a chart of lines over a quantity; `axes`: the quantities with their units. Points
+    /// that are not finite are left out, and long lines thinned as over frames.
     pub fn over(
         title: impl Into<String>,
         axes: [&str; 2],
