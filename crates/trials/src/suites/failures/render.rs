@@ -3,7 +3,7 @@
 use super::{Candidate, Family, Scope, Standing};
 use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::render::accuracy::{march, rays};
-use crate::suites::render::faults::{Drawer, drawers, made};
+use crate::suites::render::faults::{Drawer, drawers, made_or_empty};
 use crate::suites::render::scenes::{ISO, frame};
 use crate::suites::render::{By, EXACT, SPARSE};
 use glam::{DVec3, Vec3};
@@ -90,9 +90,12 @@ const CONDITIONS: [Condition<Picture>; 4] = [
     },
 ];
 
-/// Bone where a signed distance in mm is over 0, 500 HU a voxel.
-fn bone(inside_mm: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
-    made([EDGE; 3], |p| f64::from(ISO) + 500.0 * inside_mm(p))
+/// Draws bone where a signed distance in mm is over 0, 500 HU a voxel.
+fn drawn(by: &Picture, inside_mm: impl Fn(DVec3) -> f64, frame: &Frame) -> Trial {
+    match made_or_empty([EDGE; 3], |p| f64::from(ISO) + 500.0 * inside_mm(p)) {
+        Ok(bone) => compared(by, &bone, frame),
+        Err(fault) => Trial { fault: Some(format!("the volume is refused: {fault}")), trace: Vec::new() },
+    }
 }
 
 /// A plate across the whole volume, its normal along nothing, seen at an angle to it, degrees.
@@ -101,7 +104,7 @@ fn plate(by: &Picture, thick_mm: f64, angle: f64) -> Trial {
     let along = normal.any_orthonormal_vector();
     let (sin, cos) = angle.to_radians().sin_cos();
     let towards = (sin * normal + cos * along).as_vec3();
-    compared(by, &bone(|p| 0.5 * thick_mm - p.dot(normal).abs()), &frame(Vec3::ZERO, towards, AWAY_MM, VIEW_RAD))
+    drawn(by, |p| 0.5 * thick_mm - p.dot(normal).abs(), &frame(Vec3::ZERO, towards, AWAY_MM, VIEW_RAD))
 }
 
 /// Upright rods, three diameters apart.
@@ -109,7 +112,7 @@ fn rods(by: &Picture, diameter_mm: f64, away_mm: f32) -> Trial {
     let apart = 3.0 * diameter_mm;
     let beside = |x: f64| x - apart * (x / apart).round();
     let inside = |p: DVec3| 0.5 * diameter_mm - beside(p.x).hypot(beside(p.y));
-    compared(by, &bone(inside), &frame(Vec3::ZERO, Vec3::new(0.3, 1.0, 0.2), away_mm, 0.3))
+    drawn(by, inside, &frame(Vec3::ZERO, Vec3::new(0.3, 1.0, 0.2), away_mm, 0.3))
 }
 
 fn compared(by: &Picture, bone: &Arc<BoneVolume>, frame: &Frame) -> Trial {

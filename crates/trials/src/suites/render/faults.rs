@@ -17,7 +17,7 @@ use std::sync::Arc;
 use trepan_gpu::Gpu;
 use trepan_mesh::TetMesh;
 use trepan_render::{Camera, Casting, Cut, Frame, Image, SceneData};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, BoneError, BoneVolume, VoxelVolume};
 
 const SIZE: [u32; 2] = [97, 61];
 
@@ -35,14 +35,19 @@ pub fn run(gpu: Option<&Gpu>, findings: &mut Findings) {
 }
 
 /// Bone of a rule in voxels of 1 mm around the origin.
-pub fn made(edge: [usize; 3], hu: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
+fn made(edge: [usize; 3], hu: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
+    made_or_empty(edge, hu).expect("there is bone")
+}
+
+/// Bone of a rule in voxels of 1 mm around the origin; an error if no voxel holds any.
+pub fn made_or_empty(edge: [usize; 3], hu: impl Fn(DVec3) -> f64) -> Result<Arc<BoneVolume>, BoneError> {
     let low = Vec3::from(edge.map(|n| 0.5 - 0.5 * n as f32));
     let mut ct = VoxelVolume::isotropic(edge, low, 1.0, AIR_HU);
     for at in 0..ct.data.len() {
         let p = ct.centre_of([at % edge[0], at / edge[0] % edge[1], at / (edge[0] * edge[1])]);
         ct.data[at] = hu(p).clamp(-1000.0, 3000.0) as i16;
     }
-    Arc::new(BoneVolume::new(&ct, ISO).expect("there is bone"))
+    BoneVolume::new(&ct, ISO).map(Arc::new)
 }
 
 /// Name, bone, camera, pixels.
