@@ -42,7 +42,7 @@ mod ours;
 use super::python::Workshop;
 use super::tled::outside;
 use super::{Part, Scope};
-use crate::engine::picture::{Chart, Mark};
+use crate::engine::picture::{Chart, Mark, Table};
 use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::{Context, Result};
 use serde::Deserialize;
@@ -329,17 +329,27 @@ pub fn judge(_: Scope, findings: &mut Findings) {
             &moving,
         ),
     ];
-    for chart in &charts {
-        for limit in LIMITS {
-            for method in methods(chart) {
-                let within = chart.marks.iter().filter(|mark| program(&mark.method) == method && mark.error <= limit);
-                let least = within.min_by(|a, b| a.cost.total_cmp(&b.cost));
-                let said = least.map_or("never".to_string(), |mark| format!("{:.4} ({})", mark.cost, mark.method));
-                findings.conclusions.push(format!("{method}, least {} within {limit} %: {said}", chart.cost));
-            }
-        }
-    }
+    findings.tables.extend(charts.iter().map(least_costs));
     findings.charts.extend(charts);
+}
+
+/// Least cost of each program within each error.
+fn least_costs(chart: &Chart) -> Table {
+    let within = |method: &str, limit: f64| {
+        let marks = chart.marks.iter().filter(|mark| program(&mark.method) == method && mark.error <= limit);
+        let least = marks.min_by(|a, b| a.cost.total_cmp(&b.cost));
+        least.map_or("never".to_string(), |mark| format!("{:.4} ({})", mark.cost, mark.method))
+    };
+    let row = |method: &str| {
+        std::iter::once(method.to_string()).chain(LIMITS.iter().map(|limit| within(method, *limit))).collect()
+    };
+    Table {
+        title: format!("Least {} within an error", chart.cost.replace('_', " ")),
+        columns: std::iter::once("program".to_string())
+            .chain(LIMITS.iter().map(|limit| format!("{limit} %")))
+            .collect(),
+        rows: methods(chart).into_iter().map(row).collect(),
+    }
 }
 
 const ERROR: &str = "displacement_error_percent";
