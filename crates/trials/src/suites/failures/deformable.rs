@@ -32,7 +32,7 @@ fn methods(_: Scope) -> Vec<Candidate<Method>> {
         let standing = match () {
             () if told.is_oracle => Standing::Oracle,
             () if method == Method::RECOMMENDED => Standing::Own,
-            () => Standing::by_source(told.name, told.source),
+            () => Standing::by_name(told.name),
         };
         // The oracle is too slow for a way of a thousand steps.
         let conditions = if told.is_oracle { &CONDITIONS[..POINTWISE] } else { &CONDITIONS[..] };

@@ -19,7 +19,7 @@ pub const FAMILY: Family<Model> = Family {
 
 fn methods(_: Scope) -> Vec<Candidate<Model>> {
     let candidate = |(name, method): (&'static str, Model)| {
-        let standing = if name == CHOSEN { Standing::Own } else { Standing::by_source(name, "") };
+        let standing = if name == CHOSEN { Standing::Own } else { Standing::by_name(name) };
         Candidate { name: name.into(), standing, conditions: &CONDITIONS, method }
     };
     models().into_iter().map(candidate).collect()

@@ -48,9 +48,9 @@ impl Standing {
         ["own", "thesis", "rival", "oracle"][self as usize]
     }
 
-    /// Standing of a method that is neither recommended nor an oracle, by its name and source.
-    fn by_source(name: &str, source: &str) -> Self {
-        if [name, source].iter().any(|text| text.contains("thesis")) { Self::Thesis } else { Self::Rival }
+    /// Standing of a method that is neither recommended nor an oracle, by its name.
+    fn by_name(name: &str) -> Self {
+        if name.contains("thesis") { Self::Thesis } else { Self::Rival }
     }
 }
 

@@ -37,7 +37,7 @@ fn methods(scope: Scope) -> Vec<Candidate<Option<Method>>> {
         let standing = match () {
             () if told.is_oracle => Standing::Oracle,
             () if told.source == Method::RECOMMENDED.descriptor().source => Standing::Own,
-            () => Standing::by_source(told.name, told.source),
+            () => Standing::by_name(told.name),
         };
         // The oracle is too slow for a loop of thousands of ticks; a quick run leaves out two.
         let first = match standing {

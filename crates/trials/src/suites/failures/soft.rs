@@ -35,7 +35,7 @@ fn methods(scope: Scope) -> Vec<Candidate<Solver>> {
         let standing = match method {
             Solver::Tled { .. } => Standing::Own,
             Solver::Rival(rival) if rival.descriptor().is_static => Standing::Oracle,
-            Solver::Rival(rival) => Standing::by_source(name, rival.descriptor().source),
+            Solver::Rival(_) => Standing::by_name(name),
         };
         // The last two are long; a quick run puts only our own solvers to them.
         let conditions = if standing == Standing::Own { &CONDITIONS[..] } else { &CONDITIONS[..scope.pick(5, 7)] };

@@ -23,7 +23,7 @@ pub const FAMILY: Family<&str> = Family {
 fn methods(_: Scope) -> Vec<Candidate<&'static str>> {
     let candidate = |rule: &'static str| {
         let own = rule == OURS || rule == RULES[1];
-        let standing = if own { Standing::Own } else { Standing::by_source(rule, "") };
+        let standing = if own { Standing::Own } else { Standing::by_name(rule) };
         Candidate { name: rule.into(), standing, conditions: &CONDITIONS, method: rule }
     };
     RULES.into_iter().map(candidate).collect()
