@@ -15,7 +15,9 @@
 //! the tissue without bound: no elastic model has an answer there, and none is asked for. The same
 //! holds for stress at the edge of a clamp, where every mesh gives another value; only force and
 //! displacement are judged. The meshes of TLED fill the body's mask, each in its own way, so that
-//! the error holds what their shape lacks, too.
+//! the error holds what their shape lacks, too. Under the ball the surface is pressed together
+//! until it may crease, and no spring holds it sideways: `fixtures/fem/README.md` tells how far
+//! apart two meshes of the truth are along the normal and sideways.
 
 use super::Scope;
 use crate::engine::suite::{Findings, Gate, Row};
