@@ -5,7 +5,7 @@ mod common;
 
 use common::{Random, block, moving_tool, tool_at};
 use glam::{Quat, Vec3};
-use trepan_deformable::rivals::{brute, hashed_grid, thesis, uniform_grid};
+use trepan_deformable::rivals::{brute, hashed_grid, surface_boxes, thesis, uniform_grid};
 use trepan_deformable::{Config, ConfigError, Method, Response, TissueCollision, TissueStep};
 use trepan_geometry::Tool;
 use trepan_mesh::TetMesh;
@@ -299,8 +299,11 @@ fn far_away_nothing_touches_and_bad_input_is_counted() {
         let mut collision = collision(&mesh, method);
         let out = step_at(&mut collision, &mesh, Vec3::splat(60.0));
         assert!(!out.manifold.touches() && out.nodal.is_empty() && out.points_in_contact == 0);
-        let mut bad = step_at(&mut collision, &mesh, Vec3::splat(6.0));
-        assert!(bad.points_in_contact == 211 || !method.descriptor().is_complete && bad.points_in_contact > 100);
+        // What is drawn at random is found within some steps.
+        let mut bad = (0..20).map(|_| step_at(&mut collision, &mesh, Vec3::splat(6.0))).last().expect("some steps");
+        // A tool wholly inside is beyond what looks at the surface alone.
+        let least = if method == Method::of(&surface_boxes::METHOD) { 0 } else { 100 };
+        assert!(bad.points_in_contact == 211 || !method.descriptor().is_complete && bad.points_in_contact >= least);
         collision.step(&mesh.positions, &[], &tool_at(Vec3::splat(6.0), Quat::IDENTITY), &mut bad);
         assert_eq!((bad.points_in_contact, bad.manifold.touches(), bad.skipped), (0, false, mesh.tets.len() as u32));
         let nowhere = step_at(&mut collision, &mesh, Vec3::NAN);

@@ -227,7 +227,9 @@ mod tests {
 
     fn judged(rows: Vec<Row>) -> Findings {
         let mut findings = Findings { rows, ..Findings::default() };
-        judge(Scope { quick: true, seed: 1 }, &mut findings);
+        let scope = Scope { quick: true, seed: 1 };
+        judge(scope, &mut findings);
+        crate::engine::limits::mark("ablation", scope, &mut findings.gates);
         findings
     }
 
