@@ -17,7 +17,7 @@
 //! # Practice
 //! 466 points. World mm, g, ms, N. A ball that is pressed by δ touches with the points of a cap,
 //! evenly spread over its height, so that their mean depth is δ/2: the contact is 5 K stiff once
-//! ten points touch. k is chosen so that both springs in a row are [`STIFFNESS`]. The numbers are
+//! ten points touch. k is chosen so that both springs in a row are `STIFFNESS`. The numbers are
 //! ours: mass and K are bounded by `10 K + k < 4 m / T²`, at which an explicit step of T = 1 ms
 //! diverges.
 //!
