@@ -6,9 +6,9 @@
 //! by springs ([`PressedBall`]), without friction, so that the state at rest does not depend on the
 //! way there: the end of a slide is a press at its end. The truth is `fixtures/fem/press.jsonl` by
 //! `press.py`: quadratic displacements and linear pressure, Newton's method, f64, on its own mesh.
-//! Displacements are compared at 60 places of the surface within 15 mm of the ball, as the root mean
-//! square of the distance over that of the truth. The distance between two meshes of the truth is
-//! its own uncertainty.
+//! Displacements are compared at 60 places of the surface within 15 mm of the ball, as the root
+//! mean square of the distance over that of the truth. The distance between two meshes of the
+//! truth is its own uncertainty.
 //!
 //! # Practice
 //! The ball goes in no deeper than its radius. Further, and under a sharper probe, the rim shears
