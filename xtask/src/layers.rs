@@ -12,7 +12,7 @@ use std::process::Command;
 
 /// Crates by floor, lowest first.
 const FLOORS: [&[&str]; 6] = [
-    &["geometry", "shaders", "fixtures", "emulators"],
+    &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget"],

@@ -9,6 +9,7 @@ mod failures;
 pub mod families;
 mod force;
 mod haptics;
+mod measurement;
 mod mesh;
 mod operation;
 mod population;
@@ -115,6 +116,13 @@ pub const ALL: &[Suite] = &[
         chart: ("stiffness_over_gil", "limit_cycle_mm"),
         parts: haptics::parts,
         judge: haptics::judge,
+    },
+    Suite {
+        name: "measurement",
+        question: "which published forces, times and shapes does the simulator reproduce",
+        chart: ("measured", "ours"),
+        parts: measurement::parts,
+        judge: measurement::judge,
     },
     Suite {
         name: "operation",
