@@ -123,7 +123,7 @@ impl CollisionStage {
             under_pressure: false,
             patch: SurfacePatch::default(),
             settling: Settling::default(),
-            loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
+            loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
             step: TissueStep::default(),
             seq: 0,
         })
