@@ -13,8 +13,8 @@ use glam::Vec4;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use trepan_geometry::Vec3;
-use trepan_soft::{Anchor, Body, Fluid};
 use trepan_soft::simd::Layout;
+use trepan_soft::{Anchor, Body, Fluid};
 
 /// State of all nodes, by place.
 pub(crate) struct Nodes {

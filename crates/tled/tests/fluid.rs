@@ -47,7 +47,8 @@ fn anchors_bear_what_their_springs_say_and_let_go_above_the_level() {
     let mut body = block();
     body.materials = vec![Material::NeoHookean { young_mpa: 1e-5, poisson: 0.3, density_g_mm3: 1e-3 }];
     let top = boxes::nodes_where(&body.mesh, |p| p.z > 59.0);
-    let anchor = |&node: &u32| Anchor { node, normal: Vec3::Z, along: 0.02, across: 0.005, in_fluid: 1.0, open_mm2: 2.0 };
+    let anchor =
+        |&node: &u32| Anchor { node, normal: Vec3::Z, along: 0.02, across: 0.005, in_fluid: 1.0, open_mm2: 2.0 };
     body.anchors = top.iter().map(anchor).collect();
     let mean = |positions: &[Vec3]| -> Vec3 {
         top.iter().map(|&n| positions[n as usize] - body.mesh.positions[n as usize]).sum::<Vec3>() / top.len() as f32
