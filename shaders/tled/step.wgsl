@@ -17,5 +17,11 @@ struct Step {
     fade_gain: vec2f,
     // Planes, behind the springs in their list.
     planes: u32,
+    // Fluid around the body: pressure in an opening, MPa; unit vector against gravity, height of
+    // the level along it, acceleration of what lies above.
+    opening: f32,
+    up: vec3f,
+    level: f32,
+    weight: vec3f,
 }
 @group(0) @binding(0) var<uniform> now: Step;

@@ -30,6 +30,7 @@ pub mod boxes;
 mod contact;
 mod energy;
 mod factor;
+mod fluid;
 mod law;
 mod list;
 mod material;
@@ -48,6 +49,7 @@ pub use bound::{
 };
 pub use contact::{FreeNode, Gain, ImplicitSprings};
 pub use energy::{FADE_BELOW, NeoHookean, STEEPENING};
+pub use fluid::{Anchor, Fluid, LEVEL_BAND_MM};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};
 pub use method::{Descriptor, Method};

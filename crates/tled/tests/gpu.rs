@@ -4,7 +4,7 @@
 use trepan_contact::{NodalContact, PlaneContact};
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, adapter_for_tests as device};
-use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_soft::{Anchor, Body, Fluid, Loads, Material, SoftSolver, boxes};
 use trepan_tled::gpu::{GpuTled, GpuTledError, WithSpare};
 use trepan_tled::{Config, Relaxation, Tled};
 
@@ -28,7 +28,7 @@ fn loads(body: &Body) -> Loads {
     }
     contact.normalise();
     contact.offset_mm = 3.0 - contact.mean(|n| body.mesh.positions[n as usize]).z;
-    let mut loads = Loads { gravity: Vec3::new(3e-3, 0.0, -2e-3), contacts: contact.into() };
+    let mut loads = Loads { gravity: Vec3::new(3e-3, 0.0, -2e-3), contacts: contact.into(), ..Loads::default() };
     // A shaft that lies over some of the same nodes, and a wall beside.
     let slanted = Vec3::new(0.6, 0.0, 0.8);
     let offset_mm = 1.0 - contact.mean(|n| body.mesh.positions[n as usize]).dot(slanted);
@@ -106,6 +106,32 @@ fn apart(gpu: &Gpu, body: &Body, config: &Config) -> (f32, f32) {
     }
     let way = largest_difference(cpu.positions(), &body.mesh.positions);
     (largest_difference(cpu.positions(), device.positions()) / way, way)
+}
+
+/// Anchors on one side, an opening above, and a level that falls through the block.
+#[test]
+fn anchors_and_a_falling_level_of_fluid_agree_with_the_processor() {
+    let Some(gpu) = device() else { return };
+    let mut body = body();
+    let anchor = |node: u32| {
+        let open_mm2 = if body.mesh.positions[node as usize].z > 39.0 { 20.0 } else { 0.0 };
+        Anchor { node, normal: Vec3::X, along: 0.02, across: 0.005, in_fluid: 0.5, open_mm2 }
+    };
+    body.anchors = boxes::nodes_where(&body.mesh, |p| p.x > 59.0).into_iter().map(anchor).collect();
+    let mut loads = loads(&body);
+    let mut device = GpuTled::new(&gpu, &body, &config()).unwrap();
+    let mut cpu = Tled::new(&body, &config()).unwrap();
+    for step in 0..400u16 {
+        let level_mm = 45.0 - 0.1 * f32::from(step);
+        loads.fluid = Fluid { up: Vec3::Z, level_mm, weight: Vec3::NEG_Z * 4e-3, opening_mpa: 2e-4 };
+        let dt = cpu.stable_dt_ms();
+        cpu.step(&loads, dt);
+        device.step(&loads, dt);
+    }
+    let largest = largest_difference(cpu.positions(), &body.mesh.positions);
+    let difference = largest_difference(cpu.positions(), device.positions());
+    assert!(largest > 1.0 && difference <= 1e-4 * largest, "{difference} of {largest}");
+    assert_eq!(gpu.faults().count, 0, "{:?}", gpu.faults());
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn every_material_settles_where_the_static_reference_is() {
         boxes::nodes_where(&body.mesh, |p| p.z > 39.0 && p.x < 31.0).iter().for_each(|&n| contact.add(n, 1.0));
         contact.normalise();
         (contact.normal, contact.offset_mm, contact.stiffness) = (Vec3::Z, 3.0 - 40.0, 0.5);
-        let loads = Loads { gravity: Vec3::X * 2e-3, contacts: contact.into() };
+        let loads = Loads { gravity: Vec3::X * 2e-3, contacts: contact.into(), ..Loads::default() };
         let mut exact = Reference::new(&body, &reference::Config::default()).unwrap();
         let report = exact.step(&loads, 1.0);
         assert!(report.converged, "{material:?} {report:?}");

@@ -232,6 +232,10 @@ impl GpuTled {
         let Base { config, layout, max_displacement_mm, .. } = &self.base;
         Step {
             gravity: (loads.gravity - config.balanced_gravity).to_array(),
+            opening_mpa: loads.fluid.opening_mpa,
+            up: loads.fluid.up.to_array(),
+            level_mm: loads.fluid.level_mm,
+            weight: loads.fluid.weight.to_array(),
             dt: dt_ms,
             max_speed: config.max_speed,
             max_displacement: *max_displacement_mm,
