@@ -20,8 +20,8 @@ pub(crate) struct Step {
     pub elements: u32,
     pub nodes: u32,
     pub node_groups: u32,
-    pub fade_keep: [f32; 2],
-    pub fade_gain: [f32; 2],
+    pub fade_keep: [f32; 4],
+    pub fade_gain: [f32; 4],
     pub planes: u32,
     pub unused: [u32; 3],
 }
