@@ -140,7 +140,9 @@ mod tests {
         let mesh = boxes::split_box([3, 2, 3], Vec3::new(24.0, 16.0, 20.0));
         let stiff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
         let mooney = Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 };
-        for material in [Material::BRAIN, stiff, mooney, Material::BRAIN_OGDEN] {
+        let stiffening =
+            Material::Stiffening { shear_mpa: 1e-3, share: 0.4, bound: 0.02, poisson: 0.45, density_g_mm3: 1e-3 };
+        for material in [Material::BRAIN, stiff, mooney, Material::BRAIN_OGDEN, stiffening] {
             let body = Body::uniform(mesh.clone(), vec![], material);
             for (averaged, relaxation) in
                 [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, Relaxation::BRAIN)]
@@ -149,7 +151,7 @@ mod tests {
             }
         }
         let mut mixed = Body::uniform(mesh, vec![], Material::BRAIN);
-        mixed.materials.extend([stiff, mooney, Material::BRAIN_OGDEN, Material::TUMOUR]);
+        mixed.materials.extend([stiff, mooney, Material::BRAIN_OGDEN, stiffening]);
         mixed.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t * 7 % 5) as u8);
         compare(&mixed, false, Relaxation::NONE);
         compare(&mixed, true, Relaxation::BRAIN);
