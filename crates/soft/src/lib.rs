@@ -39,6 +39,7 @@ mod pressure;
 pub mod rivals;
 pub mod simd;
 mod solver;
+mod tangent;
 mod tetra;
 
 pub use body::{Body, BodyError};
@@ -54,4 +55,5 @@ pub use method::{Descriptor, Method};
 pub use operator::Stiffness;
 pub use pressure::SurfacePressure;
 pub use solver::{Loads, NodeState, SoftSolver, StepReport};
+pub use tangent::Tangent;
 pub use tetra::Shape;

@@ -81,6 +81,17 @@ impl Elements {
         self.team.report()
     }
 
+    /// Computes every element's forces from the nodes' displacements after `relaxed_ms` of rest
+    /// there; no part sleeps.
+    pub fn forces_at_rest(&mut self, relaxed_ms: f32) -> PassReport {
+        let still_mm = std::mem::take(&mut self.still_mm);
+        self.team.wake();
+        self.volumes(relaxed_ms);
+        let report = self.forces(relaxed_ms);
+        self.still_mm = still_mm;
+        report
+    }
+
     /// Adds the mass for stiffened elements to their nodes for the rest of a step, or takes it away
     /// again.
     pub fn weigh(&self, adds: bool) {
