@@ -13,8 +13,8 @@
 //! of J continue linearly below 0.3 ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so
 //! that every energy is finite for every F.
 
-use crate::stiffening::Stiffening;
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power, squared, volumetric};
+use crate::stiffening::Stiffening;
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix3;
 
@@ -128,6 +128,17 @@ impl Law {
             Self::MooneyRivlin { c10, c01, kappa } => (2.0 * (c10 + c01), kappa),
             Self::Ogden { mu, kappa, .. } => (mu[0] + mu[1], kappa),
             Self::Stiffening(law) => (law.mu, law.kappa),
+        }
+    }
+
+    /// The same law with another bulk modulus at small strain, MPa.
+    pub fn with_bulk(self, bulk_mpa: f64) -> Self {
+        match self {
+            Self::NeoHookean(law) => Self::NeoHookean(NeoHookean { kappa: bulk_mpa, ..law }),
+            Self::StVenantKirchhoff { mu, .. } => Self::StVenantKirchhoff { lambda: bulk_mpa - mu * 2.0 / 3.0, mu },
+            Self::MooneyRivlin { c10, c01, .. } => Self::MooneyRivlin { c10, c01, kappa: bulk_mpa },
+            Self::Ogden { mu, alpha, .. } => Self::Ogden { mu, alpha, kappa: bulk_mpa },
+            Self::Stiffening(law) => Self::Stiffening(Stiffening { kappa: bulk_mpa, ..law }),
         }
     }
 

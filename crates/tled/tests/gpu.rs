@@ -141,7 +141,9 @@ fn anchors_and_a_falling_level_of_fluid_agree_with_the_processor() {
 fn every_law_with_averaged_pressure_and_relaxation_agrees_with_the_processor() {
     let Some(gpu) = device() else { return };
     let laws = [Material::BRAIN, KIRCHHOFF, MOONEY, Material::BRAIN_OGDEN, TWO_TERMS, STIFFENING];
-    for (material, name) in laws.into_iter().zip(["neo-Hookean", "Kirchhoff", "Mooney", "Ogden", "two terms", "stiffening"]) {
+    for (material, name) in
+        laws.into_iter().zip(["neo-Hookean", "Kirchhoff", "Mooney", "Ogden", "two terms", "stiffening"])
+    {
         let body = Body { materials: vec![material, Material::TUMOUR], ..body() };
         for (averaged_pressure, relaxation) in [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, FADING)] {
             let (apart, way) = apart(&gpu, &body, &Config { averaged_pressure, relaxation, ..config() });
