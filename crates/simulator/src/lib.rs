@@ -28,6 +28,7 @@ mod command;
 mod compare;
 mod device_test;
 mod error;
+mod force_scale;
 mod hand;
 mod ingredients;
 pub mod measure;

@@ -40,6 +40,8 @@ mod pressure;
 pub mod rivals;
 pub mod simd;
 mod solver;
+mod stiffening;
+mod tangent;
 mod tetra;
 
 pub use body::{Body, BodyError};
@@ -56,4 +58,6 @@ pub use method::{Descriptor, Method};
 pub use operator::Stiffness;
 pub use pressure::SurfacePressure;
 pub use solver::{Loads, NodeState, SoftSolver, StepReport};
+pub use stiffening::{STIFFENING_POWER, Stiffening};
+pub use tangent::Tangent;
 pub use tetra::Shape;
