@@ -17,7 +17,7 @@ use trepan_budget::Tissue;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_measurements::pulse;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
+use trepan_soft::{Body, BodyError, Loads, Material, SoftSolver, SurfacePressure};
 use trepan_tled::gpu::WithSpare;
 use trepan_tled::{Config, Settled, Settling, Tled, choice};
 
@@ -113,16 +113,26 @@ fn refused(fault: BodyError) -> SessionError {
 }
 
 impl Ingredients {
+    /// Material of every tissue class, in their order, for a Young's modulus of brain, MPa.
+    pub fn materials(&self, young_mpa: f32) -> Vec<Material> {
+        TissueClass::ALL.map(|class| self.laws[class as usize].like(class.material(young_mpa))).to_vec()
+    }
+
+    /// Stress relaxation.
+    pub fn relaxation(&self) -> trepan_tled::Relaxation {
+        match self.relaxation {
+            Relaxation::Off => trepan_tled::Relaxation::NONE,
+            Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
+        }
+    }
+
     /// Settings of TLED.
     pub(crate) fn config(&self) -> Config {
         Config {
             mass_scaling: MASS_ADDED,
             dynamic_mass_scaling: self.dynamic_mass_scaling,
             averaged_pressure: self.element == Element::LockingFree,
-            relaxation: match self.relaxation {
-                Relaxation::Off => trepan_tled::Relaxation::NONE,
-                Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
-            },
+            relaxation: self.relaxation(),
             threads: self.threads.unwrap_or(1),
             still_mm: if self.steps_all() { 0.0 } else { self.still_mm },
             ..Config::default()

@@ -18,10 +18,10 @@ use crate::body::Element;
 use crate::bound::dot;
 use crate::energy::{cofactor, cofactor_change, squared};
 use crate::factor::Factor;
-use crate::{Body, Law};
+use crate::{Anchor, Body, Law, Loads};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
-use trepan_contact::{NodalContact, NodalContacts};
+use trepan_contact::NodalContact;
 
 /// Most attempts to make the matrix positive definite by a shift.
 const SHIFTS: u32 = 12;
@@ -38,6 +38,7 @@ pub struct Tangent {
     fixed: Vec<bool>,
     factor: Factor,
     springs: Vec<RankOne>,
+    anchors: Vec<Anchor>,
     /// Stiffness of an element of mean size, N/mm.
     element_stiffness: f64,
 }
@@ -76,21 +77,23 @@ impl Tangent {
         let mean_mm = (body.mesh.total_mm3() / elements.len() as f64).cbrt();
         let element_stiffness = laws.iter().map(|law| law.moduli().0).fold(0.0, f64::max) * mean_mm;
         let rest = body.mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-        Some(Self { elements, laws, groups, rest, fixed, factor, springs: Vec::new(), element_stiffness })
+        let (springs, anchors) = (Vec::new(), body.anchors.clone());
+        Some(Self { elements, laws, groups, rest, fixed, factor, springs, anchors, element_stiffness })
     }
 
-    /// Assembles and factors the tangent at displacements `u`, mm, with the springs that press now.
-    /// False when no shift made it positive definite.
-    pub fn factor(&mut self, u: &[DVec3], contacts: &NodalContacts) -> bool {
+    /// Assembles and factors the tangent at displacements `u`, mm, with the springs that press and the
+    /// anchors that hold now. False when no shift made it positive definite.
+    pub fn factor(&mut self, u: &[DVec3], loads: &Loads) -> bool {
         let depth_mm = |contact: &NodalContact| -> f64 {
             let along = |(n, w): (usize, f64)| w * (self.rest[n] + u[n]).dot(contact.normal.as_dvec3());
             f64::from(contact.offset_mm) + known(contact, u.len()).map(along).sum::<f64>()
         };
         let presses = |contact: &NodalContact| contact.stiffness > 0.0 && depth_mm(contact) > 0.0;
-        let pressing: Vec<NodalContact> = contacts.all().filter(presses).collect();
+        let pressing: Vec<NodalContact> = loads.contacts.all().filter(presses).collect();
         let mut shift = 0.0;
         for _ in 0..SHIFTS {
             self.assemble(u, &pressing);
+            self.add_anchors(u, loads);
             self.factor.add_diagonal(|_| shift);
             if self.factor.factor() {
                 self.take_in(&pressing);
@@ -176,6 +179,17 @@ impl Tangent {
         }
     }
 
+    fn add_anchors(&mut self, u: &[DVec3], loads: &Loads) {
+        for anchor in &self.anchors {
+            let at = (self.rest[anchor.node as usize] + u[anchor.node as usize]).as_vec3();
+            let held = f64::from(1.0 - anchor.in_fluid * loads.fluid.dryness(at));
+            let (n, along, across) = (anchor.normal.as_dvec3(), f64::from(anchor.along), f64::from(anchor.across));
+            let block = DMat3::from_cols(n * n.x, n * n.y, n * n.z) * (along - across);
+            let block = block + DMat3::from_diagonal(DVec3::splat(across));
+            self.factor.add(anchor.node, anchor.node, block * held);
+        }
+    }
+
     /// Prepares the rank-one terms of springs on several nodes.
     fn take_in(&mut self, pressing: &[NodalContact]) {
         self.springs.clear();
@@ -246,7 +260,7 @@ mod tests {
         let mut force = rest.clone();
         Stiffness::of(&body).apply(&wanted, &mut force);
         let mut tangent = Tangent::of(&body, false).unwrap();
-        assert!(tangent.factor(&rest, &NodalContacts::none()));
+        assert!(tangent.factor(&rest, &Loads::default()));
         let mut found = force.clone();
         tangent.solve(&mut found);
         assert!(apart(&found, &wanted) < 1e-9, "{}", apart(&found, &wanted));
@@ -258,7 +272,7 @@ mod tests {
             let mut pressed = force.clone();
             let along: f64 = known(&spring, rest.len()).map(|(n, w)| w * wanted[n].z).sum();
             known(&spring, rest.len()).for_each(|(n, w)| pressed[n].z += 100.0 * w * along);
-            assert!(tangent.factor(&rest, &spring.into()));
+            assert!(tangent.factor(&rest, &Loads { contacts: spring.into(), ..Loads::default() }));
             tangent.solve(&mut pressed);
             assert!(apart(&pressed, &wanted) < 1e-7, "{}", apart(&pressed, &wanted));
         }

@@ -1,12 +1,12 @@
 //! Equilibrium under given loads, e.g. sag or brain shift, by Newton's method on TLED's own forces.
 //!
 //! # Theory
-//! The residual r is the force on the free nodes: elements, weight, contact springs, pressure. A
-//! step is `d = B r`. B starts from the factored tangent of the same laws on plain elements
-//! ([`Tangent`]) and is corrected by the last changes of displacement and residual (limited-memory
-//! BFGS: Nocedal 1980). So what the tangent leaves out is learnt: averaged pressure, relaxed stress,
-//! pressure that follows the surface. A line search on `r·d` shortens a step after which the
-//! residual points back.
+//! The residual r is the force on the free nodes: elements, weight, anchors, contact springs,
+//! pressure. A step is `d = B r`. B starts from the factored tangent of the same laws on plain
+//! elements ([`Tangent`]) and is corrected by the last changes of displacement and residual
+//! (limited-memory BFGS: Nocedal 1980). So what the tangent leaves out is learnt: averaged pressure,
+//! relaxed stress, pressure that follows the surface. A line search on `r·d` shortens a step after
+//! which the residual points back.
 //!
 //! Near rest d is the way that is left. If steps shrink by the factor ρ, `|d|/(1 - ρ)` bounds it.
 //! Where rounding of the f32 forces keeps d from shrinking, the way left is the largest d of the
@@ -125,7 +125,7 @@ impl Tled {
             };
             let aged = factored_at.as_ref().map_or(1.0, |then| tangent.steepest(&difference(&at.u, then)));
             if aged > old {
-                if !tangent.factor(&at.u, &loads.contacts) {
+                if !tangent.factor(&at.u, loads) {
                     break;
                 }
                 if aged > OLD {
@@ -211,8 +211,9 @@ impl Tled {
         let (place_of, elements) = (&self.base.layout.place_of, &self.elements);
         let nodes = elements.nodes();
         let gravity = loads.gravity - self.base.config.balanced_gravity;
+        let outside = |place| nodes.weight(place, gravity, &loads.fluid) + nodes.anchor_force(place, &loads.fluid);
         let mut residual: Vec<DVec3> =
-            places().map(|place| (elements.force(place) + nodes.weight(place, gravity)).as_dvec3()).collect();
+            places().map(|place| (elements.force(place) + outside(place)).as_dvec3()).collect();
         let free = |n: u32| {
             let place = place_of[n as usize] as usize;
             FreeNode { position: nodes.position(place), velocity: Vec3::ZERO, inverse_mass: nodes.inverse_mass[place] }
