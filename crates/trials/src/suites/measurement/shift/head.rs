@@ -25,7 +25,7 @@ const OPENING_MM: f32 = 12.0;
 /// Young's modulus of the brain, MPa: the programs' default.
 const BRAIN_MPA: f32 = 0.003;
 /// Rounds of finding the skull anew, and the end of each.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 const REST: Settling = Settling { tolerance_mm: 0.02, steps: 300 };
 /// Time constant of the terms, ms: at rest they are over.
 const QUICK_MS: f32 = 1.0;
