@@ -1,15 +1,18 @@
 //! The command line that the three programs share.
 
 use crate::error::SessionError;
+use crate::force_scale::ForceScale;
 use crate::ingredients::{Given, setting, table};
 use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use trepan_budget::Quality;
 
-/// Range of `--young-modulus-kpa`.
+/// Numerical range of `--young-modulus-kpa`.
 pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
-/// Range of `--rate-hz`.
+/// Numerical range of `--csf-speed-up`.
+pub(crate) const CSF_SPEED_UPS: [f64; 2] = [1.0, 1000.0];
+/// Numerical range of `--rate-hz`.
 pub(crate) const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
 
 /// Flags of every program; names contain the unit.
@@ -36,6 +39,10 @@ pub struct Options {
     /// walls are softened by the same factor
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,
+    /// Newtons at the hand per newton of the task, on bone: people press a drill with up to 24 N
+    /// [default: the device's greatest force over that, at most 1; a replay's as recorded]
+    #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
+    pub force_scale: Option<f32>,
     /// Let other processes on this machine watch this session under this name
     #[arg(long, value_name = "NAME")]
     pub share: Option<String>,
@@ -97,9 +104,13 @@ pub struct Options {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1: the brain sinks
-    /// [default: 0.05; uncalibrated]
+    /// [default: 0.05, fitted to the shift of 61 patients]
     #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,
+    /// How much faster than in a patient the fluid drains, 1 to 1000 [default: 60, a minute for an
+    /// hour; a replay's as recorded]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    pub csf_speed_up: Option<f32>,
     /// Tissue classes (as for --tissue) that raise a warning when a tool comes close, separated by
     /// commas [default: vessel]
     #[arg(long, value_name = "CLASS,...", value_delimiter = ',')]
@@ -370,7 +381,10 @@ impl Options {
         let [softest, stiffest] = MODULI_KPA;
         within("young-modulus-kpa", self.young_modulus_kpa.map_or(softest, f64::from), softest, stiffest)?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
+        let [least, most] = ForceScale::RANGE;
+        within("force-scale", self.force_scale.map_or(most, |scale| f64::from(scale)), least, most)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
+        within("csf-speed-up", self.csf_speed_up.unwrap_or(1.0).into(), CSF_SPEED_UPS[0], CSF_SPEED_UPS[1])?;
         within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;
         rate(self.rate_hz.map_or(RATES_HZ[0], f64::from))?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
@@ -390,6 +404,8 @@ mod tests {
         assert!(parse("x --flap 91").unwrap().check().is_err() && parse("x --csf-loss -0.1").unwrap().check().is_err());
         assert!(parse("x --forbid bone").unwrap_err().to_string().contains("vessel"));
         assert!(parse("x --device-scale 0").unwrap().check().is_err());
+        assert!(parse("x --force-scale 0.2").unwrap().check().is_ok());
+        assert!(parse("x --force-scale 2").unwrap().check().unwrap_err().to_string().contains("0.01 to 1"));
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
         assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());

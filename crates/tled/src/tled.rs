@@ -7,7 +7,7 @@ use crate::nodes::{Nodes, Update, kick_ms};
 use crate::part::CALM;
 use trepan_geometry::Vec3;
 use trepan_soft::{
-    Body, BodyError, FreeNode, Gain, ImplicitSprings, Loads, NodeState, SoftSolver, StepReport, SurfacePressure,
+    Body, BodyError, Fluid, FreeNode, Gain, ImplicitSprings, Loads, NodeState, SoftSolver, StepReport, SurfacePressure,
 };
 
 /// Total Lagrangian explicit solver of one body.
@@ -21,6 +21,7 @@ pub struct Tled {
     pub(crate) pressure: SurfacePressure,
     mass_added: f32,
     gravity: Vec3,
+    fluid: Fluid,
     /// Largest growth of an element's ω² in the last pass, 1/ms².
     growth: f32,
 }
@@ -54,7 +55,8 @@ impl Tled {
     /// Does one substep of at most `left_ms` and returns its length, ms. The length is the longest
     /// that is stable for the deformed elements and divides `left_ms` evenly.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
-        if std::mem::replace(&mut self.gravity, loads.gravity) != loads.gravity {
+        if (self.gravity, self.fluid) != (loads.gravity, loads.fluid) {
+            (self.gravity, self.fluid) = (loads.gravity, loads.fluid);
             self.elements.wake();
         }
         self.elements.volumes(self.base.elapsed_ms);
@@ -79,7 +81,7 @@ impl Tled {
         let free = |n: u32| FreeNode {
             position: nodes.position(place(n)),
             velocity: nodes.free_velocity(place(n), elements.force(place(n)), update),
-            inverse_mass: nodes.present_inverse_mass(place(n)),
+            inverse_mass: nodes.present_inverse_mass(place(n), update),
         };
         let step = Gain { dt_ms: update.dt_ms, gain_ms: update.keep_and_gain()[1] };
         report.contact_n = self.springs.press(&loads.contacts, step, free, |n, force| nodes.push(place(n), force));
@@ -104,6 +106,7 @@ impl Tled {
             kick_ms: kick_ms(self.base.elapsed_ms, dt_ms),
             damping_per_ms,
             gravity: loads.gravity - config.balanced_gravity,
+            fluid: loads.fluid,
             max_speed: config.max_speed,
             max_displacement_mm: self.base.max_displacement_mm,
             rigid,
@@ -118,6 +121,7 @@ impl Tled {
         let nodes = Nodes::of(body, &base.layout, &masses);
         Ok(Self {
             gravity: Vec3::ZERO,
+            fluid: Fluid::default(),
             growth: 0.0,
             elements: Elements::of(body, &base.layout, (&scaling, base.dynamic_scaling()), nodes, config),
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),

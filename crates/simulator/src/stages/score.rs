@@ -50,6 +50,8 @@ pub struct ScoreKeeper {
     pub peak_tissue_depth_mm: f32,
     /// Largest force on the hand, N.
     pub peak_force_n: f32,
+    /// Largest force of bone on the hand, N.
+    pub peak_bone_force_n: f32,
     /// Largest change of force between two ticks, N.
     pub peak_force_step_n: f32,
     #[serde(skip)]
@@ -90,6 +92,7 @@ impl ScoreKeeper {
         self.tool_changes += u32::from(record.tool != self.tool);
         self.tool = record.tool;
         self.peak_force_n = self.peak_force_n.max(force.length());
+        self.peak_bone_force_n = self.peak_bone_force_n.max((force - record.tissue_force).length());
         self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
         self.last_force = force;
         self.bone_removed_mm3 += f64::from(record.removed_mm3);
