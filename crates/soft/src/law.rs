@@ -13,8 +13,8 @@
 //! of J continue linearly below 0.3 ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so
 //! that every energy is finite for every F.
 
-use crate::stiffening::Stiffening;
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power, squared, volumetric};
+use crate::stiffening::Stiffening;
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix3;
 

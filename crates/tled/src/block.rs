@@ -186,8 +186,8 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let (own, (resistance, _)) = (d.j - L::splat(1.0), d.resistance());
                 let volume_change = if A { L::mean(self.averages, corners) } else { own } - resistance;
                 let moduli = M::moduli(&constants);
-                let gained = stiffness(&stress, moduli, &d, volume_change)
-                    - stiffness_at_rest(M::at_rest(&constants), moduli);
+                let gained =
+                    stiffness(&stress, moduli, &d, volume_change) - stiffness_at_rest(M::at_rest(&constants), moduli);
                 let mut grown = L::load(&block.omega2, part) * gained;
                 if (L::splat(self.dynamic.limit) - grown).not_positive() > 0 {
                     grown =

@@ -64,8 +64,7 @@ mod tests {
     use proptest::prelude::*;
     use trepan_soft::Law;
 
-    const STIFFENING: Law =
-        Law::Stiffening(trepan_soft::Stiffening { mu: 1.0, share: 0.3, bound: 0.02, kappa: 9.0 });
+    const STIFFENING: Law = Law::Stiffening(trepan_soft::Stiffening { mu: 1.0, share: 0.3, bound: 0.02, kappa: 9.0 });
 
     fn at_rest<M: Constitutive<K>, const K: usize>(law: Law) -> [f32; 2] {
         let constants = M::constants(&law, 1.0);

@@ -82,7 +82,10 @@ fn a_held_shear_relaxes_along_the_curve_whatever_way_it_is_turned() {
         for turn in [Quat::IDENTITY, Quat::from_rotation_y(1.0)] {
             for (t, force) in sheared(material, relaxation, turn).into_iter().enumerate() {
                 let ms = 0.25 * t as f32;
-                let left = 1.0 - 0.4 * (1.0 - (-ms / 5.0).exp()) - 0.2 * (1.0 - (-ms / 40.0).exp()) - 0.1 * (1.0 - (-ms / 20.0).exp());
+                let left = 1.0
+                    - 0.4 * (1.0 - (-ms / 5.0).exp())
+                    - 0.2 * (1.0 - (-ms / 40.0).exp())
+                    - 0.1 * (1.0 - (-ms / 20.0).exp());
                 let ratio = force / elastic[0];
                 assert!((ratio - left).abs() < 0.01, "{material:?}: {ratio} after {ms} ms, the curve says {left}");
             }
