@@ -131,6 +131,17 @@ impl Law {
         }
     }
 
+    /// The same law with another bulk modulus at small strain, MPa.
+    pub fn with_bulk(self, bulk_mpa: f64) -> Self {
+        match self {
+            Self::NeoHookean(law) => Self::NeoHookean(NeoHookean { kappa: bulk_mpa, ..law }),
+            Self::StVenantKirchhoff { mu, .. } => Self::StVenantKirchhoff { lambda: bulk_mpa - mu * 2.0 / 3.0, mu },
+            Self::MooneyRivlin { c10, c01, .. } => Self::MooneyRivlin { c10, c01, kappa: bulk_mpa },
+            Self::Ogden { mu, alpha, .. } => Self::Ogden { mu, alpha, kappa: bulk_mpa },
+            Self::Stiffening(law) => Self::Stiffening(Stiffening { kappa: bulk_mpa, ..law }),
+        }
+    }
+
     /// Whether an incompressible specimen gets stiffer against more pull, `dT/dλ > 0` for stretches
     /// 0.5 to 2, uniaxial and equibiaxial.
     pub fn is_stable(&self) -> bool {

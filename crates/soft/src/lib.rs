@@ -41,6 +41,7 @@ pub mod rivals;
 pub mod simd;
 mod solver;
 mod stiffening;
+mod tangent;
 mod tetra;
 
 pub use body::{Body, BodyError};
@@ -58,4 +59,5 @@ pub use operator::Stiffness;
 pub use pressure::SurfacePressure;
 pub use solver::{Loads, NodeState, SoftSolver, StepReport};
 pub use stiffening::{STIFFENING_POWER, Stiffening};
+pub use tangent::Tangent;
 pub use tetra::Shape;

@@ -309,6 +309,16 @@ impl Nodes {
         self.v.set(place, velocity.extend(0.0).to_array());
     }
 
+    /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, N; zero for a fixed
+    /// node.
+    pub fn weight(&self, place: usize, gravity: Vec3) -> Vec3 {
+        if self.inverse_mass[place] == 0.0 {
+            Vec3::ZERO
+        } else {
+            gravity * (self.weight[place] / self.inverse_mass[place])
+        }
+    }
+
     /// Velocity of the node at a place, mm/ms.
     #[inline(always)]
     pub fn velocity(&self, place: usize) -> Vec3 {

@@ -14,9 +14,11 @@ use trepan_soft::{
 pub struct Tled {
     pub(crate) base: Base,
     pub(crate) elements: Elements,
-    springs: ImplicitSprings,
+    /// The body at rest.
+    pub(crate) body: Body,
+    pub(crate) springs: ImplicitSprings,
     /// Surface pressure, its triangles given by place.
-    pressure: SurfacePressure,
+    pub(crate) pressure: SurfacePressure,
     mass_added: f32,
     gravity: Vec3,
     fluid: Fluid,
@@ -125,6 +127,7 @@ impl Tled {
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             mass_added: scaling.added as f32,
+            body: body.clone(),
             base,
         })
     }
@@ -210,10 +213,10 @@ impl Tled {
         }
     }
 
-    /// Sets all velocities to zero.
-    pub(crate) fn stop(&mut self) {
-        let nodes = self.elements.nodes();
-        (0..nodes.u.len()).for_each(|place| nodes.set(place, nodes.displacement(place), Vec3::ZERO));
+    /// Takes the present displacements, with zero velocities, for the start of a motion.
+    pub(crate) fn rest(&mut self) {
+        self.elements.wake();
+        self.base.elapsed_ms = 0.0;
         self.publish();
     }
 
