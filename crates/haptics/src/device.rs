@@ -76,7 +76,7 @@ impl Capabilities {
         name: String::new(),
         peak_force_n: 0.0,
         continuous_force_n: 0.0,
-        rate_hz: 1000.0,
+        rate_hz: 1000.0, // numerical
         workspace_mm: Vec3::INFINITY,
         axes_driven: 0,
         position_resolution_mm: 0.0,

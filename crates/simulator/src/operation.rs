@@ -12,7 +12,7 @@ const SCRIPTED_FLAP_MM: f32 = 24.0;
 const CSF_LOSS: f32 = 0.05;
 /// Default Young's modulus of the brain, kPa.
 const YOUNG_KPA: f32 = 3.0;
-/// Default haptic tick rate, Hz.
+/// Default haptic tick rate, Hz, numerical.
 const RATE_HZ: f32 = 1000.0;
 
 /// Settings of an operation.

@@ -7,9 +7,9 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use trepan_budget::Quality;
 
-/// Range of `--young-modulus-kpa`.
+/// Numerical range of `--young-modulus-kpa`.
 pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
-/// Range of `--rate-hz`.
+/// Numerical range of `--rate-hz`.
 pub(crate) const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
 
 /// Flags of every program; names contain the unit.

@@ -20,7 +20,7 @@ use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
 use trepan_tled::gpu::WithSpare;
 use trepan_tled::{Config, Settled, Settling, Tled, choice};
 
-/// Pressure of 1 mmHg, MPa.
+/// Pressure of 1 mmHg, MPa, by definition.
 const MPA_PER_MMHG: f32 = 1.333_22e-4;
 /// Times that the brain comes to rest in the skull under pressure, as the wall is found anew.
 const ROUNDS: usize = 3;

@@ -13,6 +13,7 @@ use crate::stages::drill::{BREAK_MM, THIN_MM};
 use crate::stages::notice::Warning;
 use crate::stages::score::cuts_into_brain;
 use trepan_link::wire::TickRecord;
+use trepan_measurements::grip;
 
 /// Time until breakthrough under which a warning is raised, ms.
 const SOON_MS: f32 = 300.0;
@@ -85,7 +86,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { near_mm: 2.0, brain_force_n: 0.5, forbidden_mm: 1.0 }
+        Self { near_mm: 2.0, brain_force_n: grip::BRAIN_FORCE_WARNING.f32(), forbidden_mm: 1.0 }
     }
 }
 
