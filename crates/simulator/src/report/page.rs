@@ -2,6 +2,7 @@
 //! scores and the machine.
 
 use crate::error::SessionError;
+use crate::constants;
 use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time};
@@ -59,6 +60,9 @@ pub(crate) fn html(
         "summary": summary,
         "parts": parts(&summary.models),
         "ingredients": KEYS.iter().map(|key| format!("{} {}", key.name, key.value(&summary.models.ingredients))).collect::<Vec<_>>(),
+        "bands": summary.bands.sentences(),
+        "calibration": constants::sentence(),
+        "constants": constants::all(),
         "events": events(outcome, recording),
         "shots": shots.iter().map(shot).collect::<Vec<_>>(),
         "charts": charts(outcome, recording)?,

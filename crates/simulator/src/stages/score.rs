@@ -52,6 +52,10 @@ pub struct ScoreKeeper {
     pub peak_force_n: f32,
     /// Largest change of force between two ticks, N.
     pub peak_force_step_n: f32,
+    /// How far the hand was past the brain's rest surface at the largest force of the tissue, and
+    /// how deep in its present surface, mm.
+    #[serde(skip)]
+    pub(crate) peak_tissue: [f32; 2],
     #[serde(skip)]
     motion: Motion,
     #[serde(skip)]
@@ -110,7 +114,10 @@ impl ScoreKeeper {
             self.tissue_s += seconds;
             self.tissue_impulse_n_s += seconds * f64::from(record.tissue_n());
             self.peak_tissue_depth_mm = self.peak_tissue_depth_mm.max(record.tissue_depth_mm);
-            self.peak_tissue_force_n = self.peak_tissue_force_n.max(record.tissue_n());
+            if record.tissue_n() > self.peak_tissue_force_n {
+                self.peak_tissue_force_n = record.tissue_n();
+                self.peak_tissue = [-record.brain_distance_mm, record.tissue_depth_mm];
+            }
         }
     }
 }
