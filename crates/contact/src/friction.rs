@@ -21,6 +21,7 @@
 
 use crate::{ContactManifold, ForceModel, Viscoelastic};
 use trepan_geometry::{Buttons, ToolState, Vec3, Wrench};
+use trepan_measurements::drilling;
 
 /// Spring, damper and Coulomb friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +60,7 @@ impl Friction {
 impl Default for Friction {
     /// A steel ball on wet bone.
     fn default() -> Self {
-        Self::new(Viscoelastic::BONE, 1.0, 0.3, 0.2)
+        Self::new(Viscoelastic::BONE, 1.0, drilling::STICKING_FRICTION.f32(), drilling::SLIPPING_FRICTION.f32())
     }
 }
 

@@ -24,6 +24,7 @@
 
 use crate::{ContactManifold, ForceModel};
 use trepan_geometry::{Buttons, ToolState, Wrench};
+use trepan_measurements::drilling;
 
 /// A force model that vibrates while drilling.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +41,7 @@ pub struct Vibration<M> {
 }
 
 /// The least share that makes the buzz stronger.
-const SLOWEST: f32 = 0.3;
+const SLOWEST: f32 = drilling::VIBRATION_SLOWEST.f32();
 
 impl<M: ForceModel> Vibration<M> {
     /// Vibration on top of `mean`.
@@ -50,7 +51,7 @@ impl<M: ForceModel> Vibration<M> {
 
     /// A drill held in the hand, lightly: 5 % of the force at 120 Hz. Uncalibrated.
     pub fn drill(mean: M) -> Self {
-        Self::new(mean, 0.05, 120.0)
+        Self::new(mean, drilling::VIBRATION_SHARE.f32(), drilling::VIBRATION_FREQUENCY.f32())
     }
 
     /// The spindle turns at this share of its free speed, 0 to 1.

@@ -23,6 +23,7 @@
 
 use crate::{ContactManifold, ForceModel};
 use trepan_geometry::{ToolState, Wrench};
+use trepan_measurements::drilling;
 
 /// `F = k p n - b vₙ n`, never pulling.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +36,8 @@ pub struct Viscoelastic {
 
 impl Viscoelastic {
     /// Bone: the thesis's 2 N/mm, with the damping that makes it stable at 1 kHz without delay.
-    pub const BONE: Self = Self { stiffness: 2.0, damping: 1.0 };
+    pub const BONE: Self =
+        Self { stiffness: drilling::CONTACT_STIFFNESS.f32(), damping: drilling::CONTACT_DAMPING.f32() };
 
     /// Brain: the thesis's 0.3 N/mm, lightly damped.
     pub const BRAIN: Self = Self { stiffness: 0.3, damping: 0.2 };

@@ -17,7 +17,7 @@
 /// Factor of a measured value of which no spread was published: a fifth, as for "inside" on the
 /// page "Against measurement".
 pub const NO_SPREAD: f64 = 1.2;
-/// Factor of a value that nobody measured.
+/// Factor of a value that nobody measured, and of a fit without an error.
 pub const NOT_MEASURED: f64 = 2.0;
 
 /// One measured value.
@@ -94,12 +94,12 @@ impl Row {
     }
 
     /// Factor by which the value may be larger or smaller: one standard deviation where a spread
-    /// was given, else [`NO_SPREAD`], or [`NOT_MEASURED`] where nothing was measured.
+    /// was given, else [`NO_SPREAD`] for a measured value and [`NOT_MEASURED`] for any other.
     pub fn factor(&self) -> f64 {
         let share = self.relative_spread();
         match share.is_finite() {
             true => 1.0 + share,
-            false if self.is_calibrated() => NO_SPREAD,
+            false if self.is_calibrated() && !matches!(self.mark, Mark::Fit) => NO_SPREAD,
             false => NOT_MEASURED,
         }
     }
@@ -134,7 +134,8 @@ mod tests {
     fn a_factor_comes_from_the_spread_else_from_what_kind_of_value_it_is() {
         let with = |spread, mark| Row { spread, value: -2.0, mark, ..brain::DENSITY }.factor();
         assert_eq!(with(0.5, Mark::Uncalibrated), 1.25);
-        assert_eq!([Mark::Abstract, Mark::Memory].map(|mark| with(f64::NAN, mark)), [NO_SPREAD, NOT_MEASURED]);
+        let factors = [Mark::Abstract, Mark::Memory, Mark::Fit].map(|mark| with(f64::NAN, mark));
+        assert_eq!(factors, [NO_SPREAD, NOT_MEASURED, NOT_MEASURED]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::RigidStep;
 use crate::cut_ball::{BAND, Crossed, Paid, Side, Sweep, Taken, covered, depths, lanes};
 use crate::nodes::{Nodes, clearance};
-use crate::removal::RemovalLaw;
+use crate::removal::{Pressed, RemovalLaw};
 use crate::rows::{GridBall, rows};
 use glam::IVec3;
 use trepan_geometry::Vec3;
@@ -36,7 +36,7 @@ pub(crate) const MOST_OPENED: usize = 1024;
 /// How near the proxy stands to where the burr has cut to, mm.
 const STANDS_MM: f32 = 0.01;
 /// Free way ahead that tells the far side of a bone from a hollow in it, mm.
-const BEYOND_MM: f32 = 3.0;
+const BEYOND_MM: f32 = trepan_measurements::drilling::FREE_WAY_BEYOND.f32();
 
 /// Where and how hard a burr cuts in one tick.
 #[derive(Clone, Copy, Debug)]
@@ -49,10 +49,21 @@ pub(crate) struct Cut {
     pub radius_mm: f32,
     /// From the middle of its cutting side to the end of it, world mm; nothing for a ball.
     pub side: Vec3,
+    /// The tool's axis, a unit vector.
+    pub axis: Vec3,
     /// How deep the burr is pressed in, mm: what makes the load.
     pub depth_mm: f32,
     /// Tick, ms.
     pub dt_ms: f32,
+}
+
+impl Cut {
+    /// How the burr is pressed, for the law.
+    fn pressed(&self) -> Pressed {
+        let &Self { radius_mm, depth_mm, dt_ms, .. } = self;
+        let cosine = (self.device - self.proxy).normalize_or_zero().dot(self.axis);
+        Pressed { radius_mm, depth_mm, cosine, dt_ms }
+    }
 }
 
 /// Where a burr stops.
@@ -135,6 +146,11 @@ impl Burr {
         }
     }
 
+    /// Cuts by another law from now on.
+    pub fn cut_by(&mut self, law: RemovalLaw) {
+        self.law = law;
+    }
+
     /// Starts a stalled spindle anew.
     pub fn reset(&mut self) {
         self.stalled = false;
@@ -192,7 +208,7 @@ impl Burr {
             self.take(bone, out);
             return;
         }
-        let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
+        let (earned, rpm) = self.law.turned(&cut.pressed(), &mut self.stalled);
         out.spindle_rpm = rpm;
         // The ball goes on from where it has cut to, as long as the proxy stands in that: what the
         // contact is uncertain by does not get into the cut.
@@ -267,7 +283,7 @@ impl Burr {
     pub fn erode(&mut self, bone: &BoneVolume, cut: &Cut, worn: &[Worn], out: &mut RigidStep) {
         self.bites.clear();
         (self.paused, self.forward) = (0, (cut.device - cut.proxy).normalize_or_zero());
-        let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
+        let (earned, rpm) = self.law.turned(&cut.pressed(), &mut self.stalled);
         out.spindle_rpm = rpm;
         let shares: f32 = worn.iter().map(|worn| worn.share).sum();
         if earned <= 0.0 || shares <= 0.0 {

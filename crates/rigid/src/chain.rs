@@ -25,6 +25,7 @@
 //! # When not to use it
 //! For torque: a chain turns freely.
 
+use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -103,6 +104,10 @@ impl RigidContact for Chain {
     fn reset(&mut self, pose: Pose) {
         self.proxy = pose;
         self.stations.iter_mut().for_each(|(height_mm, contact)| contact.reset(raised(pose, *height_mm)));
+    }
+
+    fn cut_by(&mut self, law: RemovalLaw) {
+        self.stations.iter_mut().for_each(|(_, contact)| contact.cut_by(law));
     }
 }
 

@@ -437,8 +437,9 @@ impl RigidContact for GodObjectSphere {
         if self.works {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = self.pressed.length();
-            let side = self.proxy.rotation * (0.5 * self.tool.cutting_mm * Vec3::Z);
-            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, side, depth_mm, dt_ms };
+            let axis = self.proxy.rotation * Vec3::Z;
+            let side = 0.5 * self.tool.cutting_mm * axis;
+            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, side, axis, depth_mm, dt_ms };
             self.burr.cut(bone, &cut, &mut self.surface.nodes, out);
             if self.burr.changed() {
                 self.surface.cut(self.burr.opened());
@@ -465,6 +466,10 @@ impl RigidContact for GodObjectSphere {
         self.lean.renew();
         self.near.clear();
         self.burr.reset();
+    }
+
+    fn cut_by(&mut self, law: RemovalLaw) {
+        self.burr.cut_by(law);
     }
 }
 

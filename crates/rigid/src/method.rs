@@ -63,12 +63,13 @@ pub enum Extent {
 pub struct Method {
     descriptor: &'static Descriptor,
     points: usize,
+    removal: RemovalLaw,
 }
 
 impl Method {
     /// The method of a descriptor in its default configuration.
     pub const fn of(descriptor: &'static Descriptor) -> Self {
-        Self { descriptor, points: descriptor.points }
+        Self { descriptor, points: descriptor.points, removal: descriptor.removal }
     }
 
     /// What the method says of itself.
@@ -103,14 +104,23 @@ impl Method {
         self.descriptor.extent != Extent::Ball
     }
 
+    /// The method with another law of removal; one whose law is per tick keeps it.
+    pub fn with_removal(self, removal: RemovalLaw) -> Self {
+        if matches!(self.removal, RemovalLaw::PerTick { .. }) { self } else { Self { removal, ..self } }
+    }
+
     /// What a burr takes away under this method.
     pub fn removal(&self) -> RemovalLaw {
-        self.descriptor.removal
+        self.removal
     }
 
     /// Makes the method ready for a tool. All memory is taken here.
     pub fn build(&self, tool: &Tool) -> Box<dyn RigidContact> {
-        let ready = |tool: &Tool| (self.descriptor.build)(tool, self.points);
+        let ready = |tool: &Tool| {
+            let mut contact = (self.descriptor.build)(tool, self.points);
+            contact.cut_by(self.removal.for_tool(tool));
+            contact
+        };
         if tool.cutting_mm > 0.0 { Box::new(Chain::new(tool, ready)) } else { ready(tool) }
     }
 }

@@ -1,5 +1,6 @@
 //! The seam between the haptic tick and the methods: one call a tick, plain data out.
 
+use crate::removal::RemovalLaw;
 use trepan_contact::ContactManifold;
 use trepan_geometry::{Pose, ToolState};
 use trepan_volume::BoneVolume;
@@ -19,6 +20,9 @@ pub trait RigidContact: Send {
     /// Puts the proxy at `pose` and forgets all history, as after a tool change or a pause. What
     /// others change of the bone, an undone stroke too, is noticed without it.
     fn reset(&mut self, pose: Pose);
+
+    /// Cuts by another law from now on. A method without a burr of its own ignores it.
+    fn cut_by(&mut self, _law: RemovalLaw) {}
 }
 
 /// What one step found and did.

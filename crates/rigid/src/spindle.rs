@@ -16,6 +16,7 @@
 //! For motors with a speed control: they hold ω₀ up to their greatest power and give way at once.
 
 use core::f32::consts::TAU;
+use trepan_measurements::drilling;
 
 /// A motor. The numbers are those of a type, not of a product: uncalibrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +31,18 @@ pub struct Spindle {
 
 impl Spindle {
     /// A pneumatic or electric drill of 60 000/min.
-    pub const DRILL: Self = Self { free_rpm: 60_000.0, power_w: 30.0, stall_rpm: 20_000.0 };
+    pub const DRILL: Self = Self {
+        free_rpm: drilling::BURR_SPEED.f32(),
+        power_w: drilling::BURR_POWER.f32(),
+        stall_rpm: drilling::BURR_STALL_SPEED.f32(),
+    };
+
+    /// The slow drill of a cranial perforator.
+    pub const PERFORATOR: Self = Self {
+        free_rpm: drilling::PERFORATOR_SPEED.f32(),
+        power_w: drilling::PERFORATOR_POWER.f32(),
+        stall_rpm: drilling::PERFORATOR_STALL_SPEED.f32(),
+    };
 
     /// Torque that would stop it, N mm.
     fn stopping_nmm(&self) -> f32 {
@@ -72,7 +84,7 @@ mod tests {
         let spindle = Spindle { stall_rpm: 0.0, ..Spindle::DRILL };
         let power = |torque: f32| torque * per_ms(spindle.rpm(torque));
         let half = 0.5 * spindle.stopping_nmm();
-        assert!((power(half) - 30.0).abs() < 1e-3 && power(0.9 * half) < 30.0 && power(1.1 * half) < 30.0);
+        assert!((power(half) - 60.0).abs() < 1e-3 && power(0.9 * half) < 60.0 && power(1.1 * half) < 60.0);
         assert_eq!((spindle.rpm(0.0), Spindle::DRILL.rpm(1.01 * Spindle::DRILL.stall_nmm())), (60_000.0, 0.0));
         assert!((Spindle::DRILL.rpm(0.999 * Spindle::DRILL.stall_nmm()) - 20_000.0).abs() < 100.0);
     }

@@ -3,6 +3,7 @@
 mod common;
 use common::{ISO, directions};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -61,9 +62,9 @@ struct Worst {
     deepest: f32,
 }
 
-fn operate(inward: Vec3, deepest: f32) -> Worst {
+fn operate(inward: Vec3, deepest: f32, law: RemovalLaw) -> Worst {
     let bone = skull(inward);
-    let mut contact = Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM));
+    let mut contact = Method::RECOMMENDED.with_removal(law).build(&Tool::burr(RADIUS_MM));
     let mut out = RigidStep::default();
     let (mut worst, mut last, mut lead) = (Worst::default(), Vec3::ZERO, f32::MAX);
     contact.reset(Pose::from_translation(-4.0 * inward));
@@ -95,13 +96,16 @@ fn letting_the_pedal_go_and_drawing_the_burr_out_of_its_bore_is_smooth() {
     axes.extend([Vec3::NEG_Z, Vec3::new(-0.36, -0.48, -0.8)]);
     for inward in axes {
         for deepest in [2.5, 6.75] {
-            let worst = operate(inward, deepest);
-            println!("inward {inward} to {deepest}: {worst:?}");
-            assert!(worst.after <= 0.1, "inward {inward} to {deepest} mm: {worst:?}");
-            assert!(worst.ahead <= 0.02, "inward {inward} to {deepest} mm: {worst:?}");
-            assert!(worst.drag <= 0.5, "inward {inward} to {deepest} mm: {worst:?}");
-            assert!(worst.deepest > deepest - 0.05, "inward {inward} to {deepest} mm: {worst:?}");
-            assert!(worst.drilling <= 0.1, "inward {inward} to {deepest} mm: {worst:?}");
+            // Edges that rub leave what a hand does not press enough for.
+            for (law, left_mm) in [(RemovalLaw::CONSTANT_ENERGY, 0.05), (RemovalLaw::RATE, 0.35)] {
+                let worst = operate(inward, deepest, law);
+                println!("inward {inward} to {deepest}: {worst:?}");
+                assert!(worst.after <= 0.1, "inward {inward} to {deepest} mm: {worst:?}");
+                assert!(worst.ahead <= 0.02, "inward {inward} to {deepest} mm: {worst:?}");
+                assert!(worst.drag <= 0.5, "inward {inward} to {deepest} mm: {worst:?}");
+                assert!(worst.deepest > deepest - left_mm, "inward {inward} to {deepest} mm: {worst:?}");
+                assert!(worst.drilling <= 0.1, "inward {inward} to {deepest} mm: {worst:?}");
+            }
         }
     }
 }
@@ -154,7 +158,7 @@ fn a_burr_drills_on_through_bone_at_the_end_of_the_ct() {
         let half_mm = 0.5 * edge as f32 * voxel_mm;
         let corner = Vec3::splat(0.5 * voxel_mm - half_mm);
         let bone = BoneVolume::new(&VoxelVolume::isotropic([edge; 3], corner, voxel_mm, 1500i16), ISO).unwrap();
-        let mut contact = Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM));
+        let mut contact = Method::RECOMMENDED.with_removal(RemovalLaw::CONSTANT_ENERGY).build(&Tool::burr(RADIUS_MM));
         let device = |ms: usize| Vec3::Z * (half_mm + RADIUS_MM - 1e-3 * ms as f32);
         contact.reset(Pose::from_translation(device(0)));
         let mut out = RigidStep::default();

@@ -5,7 +5,7 @@
 mod common;
 use common::{at, bone};
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_rigid::removal::RemovalLaw;
+use trepan_rigid::removal::{Pressed, RemovalLaw};
 use trepan_rigid::{Method, RigidStep};
 
 const FEED_MM_PER_MS: f32 = 1e-3;
@@ -27,7 +27,7 @@ fn fed(voxel_mm: f32, axis: Vec3, radius: f32, dt_ms: f32) -> Fed {
     let mut contact = Method::RECOMMENDED.build(&Tool::burr(radius));
     contact.reset(Pose::from_translation(axis * (radius + 0.2)));
     let (mut out, mut removed, mut depths, mut before) = (RigidStep::default(), 0.0f64, vec![], Vec3::ZERO);
-    let (ticks, whole) = ((8000.0 / dt_ms) as usize, (5500.0 / dt_ms) as usize);
+    let (ticks, whole) = ((12_000.0 / dt_ms) as usize, (10_000.0 / dt_ms) as usize);
     let mut change = 0.0f32;
     for tick in 0..ticks {
         let device = axis * (radius + 0.2 - FEED_MM_PER_MS * tick as f32 * dt_ms);
@@ -47,13 +47,14 @@ fn fed(voxel_mm: f32, axis: Vec3, radius: f32, dt_ms: f32) -> Fed {
     Fed { depth: (mean, spread.sqrt()), change, volume }
 }
 
-/// The depth at which the law takes a cylinder of the burr's width at the speed of the feed, mm.
-fn steady(radius: f32) -> f32 {
-    let wanted = PRICE * std::f32::consts::PI * radius * radius * FEED_MM_PER_MS;
+/// The depth at which the law takes a cylinder of the burr's width at the speed of the feed, mm,
+/// along a way whose cosine with the tool's axis is given.
+fn steady(radius_mm: f32, cosine: f32) -> f32 {
+    let wanted = PRICE * std::f32::consts::PI * radius_mm * radius_mm * FEED_MM_PER_MS;
     let (mut low, mut high) = (0.0, 3.0);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        let less = RemovalLaw::RATE.volume_mm3(radius, middle, 1.0) < wanted;
+        let less = RemovalLaw::RATE.volume_mm3(&Pressed { radius_mm, depth_mm: middle, cosine, dt_ms: 1.0 }) < wanted;
         (low, high) = if less { (middle, high) } else { (low, middle) };
     }
     low
@@ -73,7 +74,7 @@ fn a_steady_feed_settles_at_the_depth_of_the_law_without_a_buzz() {
     ];
     for (voxel_mm, axis, radius, dt_ms) in runs {
         let Fed { depth: (depth, spread), change, volume } = fed(voxel_mm, axis, radius, dt_ms);
-        let truth = steady(radius);
+        let truth = steady(radius, axis.z);
         println!(
             "voxel {voxel_mm} axis {axis} burr {radius} tick {dt_ms}: depth {depth} of {truth} mm, sd {spread}, \
              change {change} mm a tick, volume {volume}"

@@ -5,7 +5,8 @@ use common::{at, bone};
 use glam::IVec3;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_rigid::god_object_sphere::{Config, GodObjectSphere};
-use trepan_rigid::{Method, RigidContact, RigidStep, removal::RemovalLaw};
+use trepan_rigid::removal::{Cutter, Pressed, RemovalLaw};
+use trepan_rigid::{Method, RigidContact, RigidStep};
 
 /// Drills for `total_ms` with a spring of 2 N/mm pressing with about `newtons`, and returns the
 /// volume, mm³.
@@ -23,6 +24,11 @@ fn pressed(dt_ms: f32, total_ms: f32, newtons: f32) -> f32 {
     removed
 }
 
+/// Pressed along the tool's axis.
+fn pressed_at(radius_mm: f32, depth_mm: f32, dt_ms: f32) -> Pressed {
+    Pressed { radius_mm, depth_mm, cosine: 1.0, dt_ms }
+}
+
 #[test]
 fn the_volume_does_not_depend_on_the_tick_rate() {
     let volumes = [2.0, 1.0, 0.25, 1.0 / 6.0].map(|dt| pressed(dt, 1500.0, 1.5));
@@ -37,7 +43,7 @@ fn the_volume_is_what_the_law_says() {
     // The scene's bone is 1400 HU, 0.93 of the reference in energy; the burr at work sits another
     // 0.15 voxel deeper. Near its surface and at the foot of the cut there is less than full
     // density, so that somewhat more volume goes than the law gives for whole bone.
-    let law = RemovalLaw::RATE.volume_mm3(2.0, 0.75 + 0.075, 1500.0) / 0.93;
+    let law = RemovalLaw::RATE.volume_mm3(&pressed_at(2.0, 0.75 + 0.075, 1500.0)) / 0.93;
     let volume = pressed(1.0, 1500.0, 1.5);
     println!("law {law} removed {volume}");
     assert!((volume / law - 1.0).abs() < 0.15, "law {law} mm³, removed {volume} mm³");
@@ -48,10 +54,12 @@ fn a_3_mm_burr_opens_a_7_mm_skull_in_seconds() {
     let skull = bone([36, 36, 40], 0.5, |p| p.z.abs() - 3.5);
     let mut contact = Method::RECOMMENDED.build(&Tool::burr(3.0));
     contact.reset(Pose::from_translation(Vec3::Z * 6.5));
+    // The mean published force of drilling, 14 N, at 2 N/mm.
+    let press_mm = 0.5 * 14.0 * trepan_rigid::removal::FORCE_SCALE;
     let mut out = RigidStep::default();
     let (mut through, mut broke) = (None, None);
     for t in 0..15_000 {
-        let device = contact.proxy().translation - Vec3::Z * 0.75;
+        let device = contact.proxy().translation - Vec3::Z * press_mm;
         contact.step(&skull, &at(device), true, 1.0, &mut out);
         assert!(out.spindle_rpm < 60_000.0);
         if out.broke_through && broke.is_none() {
@@ -71,12 +79,12 @@ fn a_3_mm_burr_opens_a_7_mm_skull_in_seconds() {
 fn the_hole_has_the_shape_of_the_burr() {
     let bone = bone([32, 32, 32], 0.5, |p| p.z);
     let before = bone.snapshot();
-    let mut contact = Method::RECOMMENDED.build(&Tool::burr(2.0));
+    let mut contact = Method::RECOMMENDED.with_removal(RemovalLaw::CONSTANT_ENERGY).build(&Tool::burr(2.0));
     contact.reset(Pose::from_translation(Vec3::Z * 2.0));
     let mut out = RigidStep::default();
     let mut removed = 0.0;
-    // A stroke so slow that everything in the burr's way goes: the device sinks 1 mm and moves 6 mm
-    // across.
+    // With the law without edges that rub, and so slow that everything in the burr's way goes: the
+    // device sinks 1 mm and moves 6 mm across.
     for t in 0..6000 {
         let sunk = (t as f32 / 2000.0).min(1.0);
         let across = (t as f32 / 4000.0 - 0.5).clamp(0.0, 1.0) * 6.0 - 3.0;
@@ -122,17 +130,47 @@ fn cancellous_bone_goes_faster_than_cortical_and_a_loaded_spindle_slower() {
 
 #[test]
 fn a_stalled_burr_cuts_nothing() {
-    let RemovalLaw::Rate { spindle, cutting_ratio, specific_energy_mpa, cancellous_share, stiffness, max_load_n } =
-        RemovalLaw::RATE
-    else {
+    let RemovalLaw::Rate { perforator, cancellous_share, stiffness, max_load_n, .. } = RemovalLaw::RATE else {
         unreachable!("the default is a rate")
     };
-    let weak = trepan_rigid::spindle::Spindle { power_w: 1.0, ..spindle };
-    let law =
-        RemovalLaw::Rate { spindle: weak, cutting_ratio, specific_energy_mpa, cancellous_share, stiffness, max_load_n };
-    assert!(half_a_second(1400.0, 0.3, law).0 > 0.0);
+    let spindle = trepan_rigid::spindle::Spindle { power_w: 5.0, ..Cutter::BURR.spindle };
+    let cutter = Cutter { spindle, ..Cutter::BURR };
+    let law = RemovalLaw::Rate { cutter, perforator, cancellous_share, stiffness, max_load_n };
+    assert!(half_a_second(1400.0, 0.5, law).0 > 0.0);
     let (removed, rpm) = half_a_second(1400.0, 3.0, law);
     assert_eq!((removed, rpm), (0.0, 0.0));
+}
+
+#[test]
+fn a_burr_only_rubs_under_the_force_of_its_edges() {
+    let rubbing = Cutter::BURR.rubbing_n(2.0);
+    assert!((2.5..4.22).contains(&rubbing), "{rubbing}");
+    let task_mm = rubbing * trepan_rigid::removal::FORCE_SCALE / 2.0;
+    let by_law = |share: f32| RemovalLaw::RATE.volume_mm3(&pressed_at(2.0, share * task_mm, 1.0));
+    assert_eq!(by_law(0.99), 0.0);
+    assert!(by_law(1.01) > 0.0);
+    let [rubs, cuts] = [0.3, 2.0].map(|share| half_a_second(1400.0, 2.0 * share * task_mm, RemovalLaw::RATE).0);
+    assert!(cuts > 1.0 && rubs < 0.05 * cuts, "{rubs} {cuts}");
+}
+
+#[test]
+fn a_burr_cuts_faster_with_its_equator_than_with_its_pole() {
+    let taken = |axis: Vec3| {
+        let bone = bone([28, 28, 28], 0.5, |p| p.z);
+        let mut contact = Method::RECOMMENDED.build(&Tool::burr(2.0));
+        contact.reset(common::held(Vec3::Z * 2.0, axis));
+        let (mut out, mut removed) = (RigidStep::default(), 0.0);
+        for _ in 0..500 {
+            let pose = common::held(contact.proxy().translation - 0.75 * Vec3::Z, axis);
+            contact.step(&bone, &trepan_geometry::ToolState::at(pose), true, 1.0, &mut out);
+            removed += out.removed_mm3;
+        }
+        removed
+    };
+    let [pole, oblique, equator] = [Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::X].map(taken);
+    println!("pole {pole} oblique {oblique} equator {equator} mm3");
+    // Speeds 2/3, 0.80 and 1, less what the spindle loses under the longer arm.
+    assert!((1.08..1.25).contains(&(oblique / pole)) && (1.2..1.55).contains(&(equator / pole)));
 }
 
 #[test]
@@ -170,7 +208,7 @@ fn what_rivals_wear_off_by_voxels_is_what_their_load_earns() {
             contact.step(&bone, &at(Vec3::Z * height), true, 1.0, &mut out);
             // A hand that presses with 1.2 N.
             height += (2.0 * out.manifold.depth_mm * out.manifold.normal.z - 1.2) / 20.0;
-            earned += RemovalLaw::RATE.volume_mm3(3.0, out.manifold.depth_mm, 1.0);
+            earned += RemovalLaw::RATE.volume_mm3(&pressed_at(3.0, out.manifold.depth_mm, 1.0));
             removed += out.removed_mm3;
         }
         println!("{}: {removed} of {earned} mm³", method.name());

@@ -3,6 +3,7 @@
 
 use crate::case::plan::Plan;
 use crate::error::SessionError;
+use crate::force_scale::ForceScale;
 use crate::options::Options;
 use crate::program::Program;
 use crate::run::stop::Stop;
@@ -14,6 +15,7 @@ use trepan_haptics::{
     Capabilities, Clutch, DeviceName, HapticDevice, Motion, Opened, Setting, ThreadedDevice, Watch, Workspace, mouse,
 };
 use trepan_link::Recording;
+use trepan_rigid::removal::RemovalLaw;
 
 /// An open device of a hand.
 #[derive(Default)]
@@ -156,6 +158,8 @@ pub(crate) struct DeviceLimits {
     device: Capabilities,
     /// Motion scale, world mm per device mm.
     scale: f32,
+    /// Force scale on bone; `None` for a recording of a version without it.
+    force_scale: Option<ForceScale>,
 }
 
 /// Prefix of the first hand's header entries.
@@ -171,12 +175,16 @@ const AXES: &str = "axes_driven";
 const MASS: &str = "moving_mass_g";
 const DAMPING: &str = "damping_n_ms_per_mm";
 const SCALE: &str = "scale";
+const FORCE_SCALE: &str = "force_scale";
 
 impl DeviceLimits {
-    /// Properties of an open device whose motion is multiplied by `scale`.
-    pub fn of(device: &Capabilities, scale: f32) -> Self {
+    /// Properties of an open device whose motion is multiplied by `scale`. The force scale is that of
+    /// its greatest force unless one is given.
+    pub fn of(device: &Capabilities, scale: f32, force_scale: Option<f32>) -> Self {
         let position_resolution_mm = scale * device.position_resolution_mm;
-        Self { device: Capabilities { position_resolution_mm, ..device.clone() }, scale }
+        let greatest_n = device.guard_config().max_force_n;
+        let force_scale = Some(force_scale.map_or_else(|| ForceScale::of(greatest_n), ForceScale));
+        Self { device: Capabilities { position_resolution_mm, ..device.clone() }, scale, force_scale }
     }
 
     /// Reads the properties of a hand's device ([`FIRST`], [`SECOND`]) from a recording; zeros
@@ -194,11 +202,12 @@ impl DeviceLimits {
             damping: number(DAMPING),
             ..Capabilities::PASSIVE
         };
-        Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
+        let positive = |name: &str| Some(number(name)).filter(|&scale| scale > 0.0);
+        Self { device, scale: positive(SCALE).unwrap_or(1.0), force_scale: positive(FORCE_SCALE).map(ForceScale) }
     }
 
     /// Header entries that [`DeviceLimits::recorded`] reads.
-    pub fn entries(&self, hand: &str) -> [(String, String); 8] {
+    pub fn entries(&self, hand: &str) -> Vec<(String, String)> {
         let device = &self.device;
         [
             (PEAK, device.peak_force_n),
@@ -210,7 +219,23 @@ impl DeviceLimits {
             (DAMPING, device.damping),
             (SCALE, self.scale),
         ]
+        .into_iter()
+        .chain(self.force_scale.map(|ForceScale(scale)| (FORCE_SCALE, scale)))
         .map(|(name, value)| (format!("{hand}{name}"), value.to_string()))
+        .collect()
+    }
+
+    /// Newtons at the hand per newton of the task, on bone.
+    pub fn force_scale(&self) -> ForceScale {
+        self.force_scale.unwrap_or(ForceScale(1.0))
+    }
+
+    /// Law of removal where bone has a stiffness, N/mm, at the hand.
+    pub fn removal(&self, hand_stiffness: f32) -> RemovalLaw {
+        match self.force_scale {
+            Some(ForceScale(scale)) => RemovalLaw::RATE.with_hand(hand_stiffness, scale),
+            None => RemovalLaw::CONSTANT_ENERGY,
+        }
     }
 
     /// Configuration of the force guard.

@@ -29,6 +29,7 @@ mod compare;
 mod constants;
 mod device_test;
 mod error;
+mod force_scale;
 mod hand;
 mod ingredients;
 pub mod measure;

@@ -2,6 +2,7 @@
 
 use crate::constants;
 use crate::error::SessionError;
+use crate::force_scale::ForceScale;
 use crate::ingredients::{Given, setting, table};
 use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
@@ -37,6 +38,10 @@ pub struct Options {
     /// walls are softened by the same factor
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,
+    /// Newtons at the hand per newton of the task, on bone: people press a drill with up to 24 N
+    /// [default: the device's greatest force over that, at most 1; a replay's as recorded]
+    #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
+    pub force_scale: Option<f32>,
     /// Let other processes on this machine watch this session under this name
     #[arg(long, value_name = "NAME")]
     pub share: Option<String>,
@@ -375,6 +380,8 @@ impl Options {
         let [softest, stiffest] = MODULI_KPA;
         within("young-modulus-kpa", self.young_modulus_kpa.map_or(softest, f64::from), softest, stiffest)?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
+        let [least, most] = ForceScale::RANGE;
+        within("force-scale", self.force_scale.map_or(most, |scale| f64::from(scale)), least, most)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
         within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;
         rate(self.rate_hz.map_or(RATES_HZ[0], f64::from))?;
@@ -395,6 +402,8 @@ mod tests {
         assert!(parse("x --flap 91").unwrap().check().is_err() && parse("x --csf-loss -0.1").unwrap().check().is_err());
         assert!(parse("x --forbid bone").unwrap_err().to_string().contains("vessel"));
         assert!(parse("x --device-scale 0").unwrap().check().is_err());
+        assert!(parse("x --force-scale 0.2").unwrap().check().is_ok());
+        assert!(parse("x --force-scale 2").unwrap().check().unwrap_err().to_string().contains("0.01 to 1"));
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
         assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());

@@ -215,7 +215,7 @@ impl Session {
     /// Creates the stages for a hand without a device, for callers that do not use
     /// [`run`](Self::run). The tool is at `start`.
     pub fn stages(&self, start: ToolState) -> Result<Stages, SessionError> {
-        let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
+        let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0, self.options.force_scale);
         self.setup.stages(start, self.tick_ms(), (&limits, None))
     }
 
@@ -257,7 +257,8 @@ impl Session {
     fn limits(&self, hand: &OpenDevice, name: &str) -> DeviceLimits {
         let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
         let recorded = || DeviceLimits::recorded(self.recording.as_ref(), name);
-        hand.device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale))
+        let of = |device: &dyn HapticDevice| DeviceLimits::of(&device.capabilities(), scale, self.options.force_scale);
+        hand.device.as_deref().map_or_else(recorded, of)
     }
 
     /// Tool before the first reading of its device. A replay starts here too, because the first

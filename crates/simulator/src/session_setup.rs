@@ -122,7 +122,8 @@ impl SessionSetup {
         let voxel_mm = self.models.setup.bone.spacing_mm as f32;
         let usual = HapticConfig::usual(self.program);
         let config = |limits: &DeviceLimits| HapticConfig {
-            rigid,
+            rigid: rigid.with_removal(limits.removal(limits.coupled(BONE, tick_ms).stiffness)),
+            force_scale: limits.force_scale().0,
             dt_ms: tick_ms,
             bone_force: bone_force(limits.coupled(BONE, tick_ms), &with, voxel_mm),
             tissue_force: limits.coupled(TISSUE, tick_ms),

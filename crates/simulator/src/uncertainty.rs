@@ -6,7 +6,7 @@
 //! `s = d ln output / d ln constant`:
 //! ```text
 //! force on tissue   s = d / (d + F/k)    d: how far the tissue gave way, F/k: the hand's spring
-//! time of drilling  s = 1                energy of cutting
+//! time of drilling  s = F / (F - F₀)     F: mean load on the burr, F₀: load under which it rubs
 //! ```
 //! The force of a tissue that gives way by d is in proportion to its stiffness; a hand that holds
 //! its place sinks in deeper where tissue is softer, and feels less of the difference. The secant
@@ -19,12 +19,18 @@
 use crate::constants;
 use crate::stages::score::ScoreKeeper;
 use serde::Serialize;
-use trepan_measurements::{Row, sensitivity};
+use trepan_measurements::{Row, drilling, sensitivity};
+use trepan_rigid::removal::Cutter;
 
 /// Stiffness of brain, with its spread between sources.
 pub(crate) const STIFFNESS: Row = sensitivity::SHEAR_MODULUS;
 /// Energy of cutting bone.
-pub(crate) const ENERGY: Row = sensitivity::SPECIFIC_ENERGY;
+pub(crate) const ENERGY: Row = drilling::BURR_ENERGY;
+/// Radius of the burr that the session begins with, mm.
+const BURR_MM: f32 = 3.0;
+/// Largest power that a time of drilling takes from the energy: nearer to rubbing the first order
+/// fails.
+const MOST_POWER: f64 = 3.0;
 
 /// A value and the band that the spread of a constant leaves it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -53,9 +59,10 @@ impl Band {
         Self::of(force_n.into(), &STIFFNESS, if known { power.into() } else { 1.0 })
     }
 
-    /// Band of a time of drilling, s.
-    pub(crate) fn of_drilling(seconds: f64) -> Self {
-        Self::of(seconds, &ENERGY, 1.0)
+    /// Band of a time of drilling, s, under a mean load, newtons of the task.
+    pub(crate) fn of_drilling(seconds: f64, load_n: f64) -> Self {
+        let cuts_n = load_n - f64::from(Cutter::BURR.rubbing_n(BURR_MM));
+        Self::of(seconds, &ENERGY, if cuts_n > 0.0 { (load_n / cuts_n).min(MOST_POWER) } else { MOST_POWER })
     }
 }
 
@@ -69,28 +76,30 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Bands of scores.
-    pub(crate) fn of(scores: &ScoreKeeper) -> Self {
-        let ScoreKeeper { peak_tissue_force_n, peak_tissue, drilling_s, .. } = *scores;
+    /// Bands of scores; `scale` is the newtons at the hand per newton of the task, on bone.
+    pub(crate) fn of(scores: &ScoreKeeper, scale: f32) -> Self {
+        let ScoreKeeper { peak_tissue_force_n, peak_tissue, drilling_s, cutting: [newton_s, cutting_s], .. } = *scores;
+        let load_n = newton_s / (cutting_s * f64::from(scale));
         let [way_mm, depth_mm] = peak_tissue;
         let force = Band::of_tissue_force(peak_tissue_force_n, way_mm, depth_mm);
         Self {
             tissue_force_n: (peak_tissue_force_n > 0.0).then_some(force),
-            drilling_s: (drilling_s > 0.0).then(|| Band::of_drilling(drilling_s)),
+            drilling_s: (cutting_s > 0.0 && scale > 0.0).then(|| Band::of_drilling(drilling_s, load_n)),
         }
     }
 
     /// Each band in a sentence.
     pub(crate) fn sentences(&self) -> Vec<String> {
-        let from = |row: &Row, spread: &str, guess: &str| {
-            if row.is_calibrated() { spread.to_string() } else { format!("{guess}, which is uncalibrated") }
+        let from = |row: &Row, what: &str| match row.spread.is_nan() {
+            true => format!("a factor of {:.1} assumed for {what}", row.factor()),
+            false => format!("the spread of {what}, a factor of {:.2}", row.factor()),
         };
         let force = self.tissue_force_n.map(|Band { value, low, high }| {
-            let from = from(&STIFFNESS, "the spread of tissue stiffness", "tissue stiffness");
+            let from = from(&STIFFNESS, "tissue stiffness");
             format!("greatest force on the brain {value:.2} N ({low:.2} to {high:.2} from {from})")
         });
         let time = self.drilling_s.map(|Band { value, low, high }| {
-            let from = from(&ENERGY, "the spread of the energy of cutting", "the energy of cutting");
+            let from = from(&ENERGY, "the energy of cutting");
             format!("drilling {value:.1} s ({low:.1} to {high:.1} from {from})")
         });
         force.into_iter().chain(time).collect()
@@ -122,6 +131,7 @@ mod tests {
     use crate::tissue_class::TissueClass;
     use trepan_contact::NodalContact;
     use trepan_geometry::Vec3;
+    use trepan_rigid::removal::{Pressed, RemovalLaw};
     use trepan_soft::{Body, Loads, SoftSolver, boxes};
     use trepan_tled::{Config, Settling, Tled};
 
@@ -157,16 +167,36 @@ mod tests {
     }
 
     #[test]
+    fn the_band_of_a_time_of_drilling_is_that_of_cutters_of_less_and_more_energy() {
+        let rate = |share: f32| {
+            let cutter = Cutter { chip_energy_mpa: Cutter::BURR.chip_energy_mpa * share, ..Cutter::BURR };
+            let RemovalLaw::Rate { perforator, cancellous_share, stiffness, max_load_n, .. } = RemovalLaw::RATE else {
+                unreachable!()
+            };
+            let law = RemovalLaw::Rate { cutter, perforator, cancellous_share, stiffness, max_load_n };
+            let pressed = Pressed { radius_mm: BURR_MM, depth_mm: 14.0 / stiffness, cosine: 0.0, dt_ms: 1.0 };
+            f64::from(law.volume_mm3(&pressed))
+        };
+        let step = 1.05;
+        let truth = (rate(1.0 / step) / rate(step)).ln() / (2.0 * f64::from(step).ln());
+        let band = Band::of_drilling(1.0, 14.0);
+        let power = band.high.ln() / ENERGY.factor().ln();
+        assert!((power / truth - 1.0).abs() < 0.02, "{power} of {truth}");
+        assert!(Band::of_drilling(1.0, 1.0).high > band.high, "near to rubbing");
+    }
+
+    #[test]
     fn a_hand_that_is_followed_by_all_of_the_tissue_feels_all_of_its_spread() {
         let factor = STIFFNESS.factor();
         let all = Band::of_tissue_force(1.0, 4.0, 0.0);
         assert!((all.high - factor).abs() < 1e-6 && (all.low * factor - 1.0).abs() < 1e-6, "{all:?}");
         assert_eq!(Band::of_tissue_force(1.0, -2.0, 1.0), Band::of_tissue_force(1.0, f32::INFINITY, 1.0));
-        let none = Bands::of(&ScoreKeeper::default());
+        let none = Bands::of(&ScoreKeeper::default(), 0.2);
         assert_eq!((none, none.sentences().len()), (Bands::default(), 0));
         let mut scores = ScoreKeeper::default();
-        (scores.peak_tissue_force_n, scores.peak_tissue, scores.drilling_s) = (0.2, [3.0, 1.0], 6.0);
-        let sentences = Bands::of(&scores).sentences();
+        (scores.peak_tissue_force_n, scores.peak_tissue) = (0.2, [3.0, 1.0]);
+        (scores.drilling_s, scores.cutting) = (6.0, [10.0, 5.0]);
+        let sentences = Bands::of(&scores, 0.2).sentences();
         assert!(sentences[0].starts_with("greatest force on the brain 0.20 N (0.1"), "{sentences:?}");
         assert!(sentences[1].starts_with("drilling 6.0 s ("), "{sentences:?}");
         assert!(beside(0.01, 0.1).starts_with("model error 10 % of the force, constants -"));

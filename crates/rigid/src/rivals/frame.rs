@@ -54,8 +54,9 @@ impl Held {
     pub fn cut(&mut self, bone: &BoneVolume, device: Vec3, proxy: Vec3, depth_mm: f32, out: &mut RigidStep) {
         if self.cuts {
             let (radius_mm, dt_ms) = (self.tool.tip_radius_mm, self.dt_ms);
-            let side = self.proxy.rotation * (0.5 * self.tool.cutting_mm * Vec3::Z);
-            let cut = Cut { device, proxy, radius_mm, side, depth_mm, dt_ms };
+            let axis = self.proxy.rotation * Vec3::Z;
+            let side = 0.5 * self.tool.cutting_mm * axis;
+            let cut = Cut { device, proxy, radius_mm, side, axis, depth_mm, dt_ms };
             if self.bone != bone.id() {
                 self.bone = bone.id();
                 self.nodes.forget();
@@ -78,7 +79,8 @@ impl Held {
         if self.cuts && depth_mm.is_finite() && self.dt_ms.is_finite() && self.dt_ms > 0.0 {
             let proxy = self.proxy.translation;
             let (radius_mm, dt_ms) = (self.tool.tip_radius_mm, self.dt_ms);
-            let cut = Cut { device: proxy - depth_mm * normal, proxy, radius_mm, side: Vec3::ZERO, depth_mm, dt_ms };
+            let (device, axis) = (proxy - depth_mm * normal, self.proxy.rotation * Vec3::Z);
+            let cut = Cut { device, proxy, radius_mm, side: Vec3::ZERO, axis, depth_mm, dt_ms };
             self.burr.erode(bone, &cut, worn, out);
         }
     }
@@ -140,6 +142,10 @@ impl<R: Rival> RigidContact for Framed<R> {
         self.held.burr.reset();
         self.placed = pose.translation.is_finite();
         self.rival.reset(pose);
+    }
+
+    fn cut_by(&mut self, law: RemovalLaw) {
+        self.held.burr.cut_by(law);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Bone;
 use super::directions::{Directions, SHARE};
 use super::price::price;
-use crate::removal::RemovalLaw;
+use crate::removal::{Pressed, RemovalLaw};
 use glam::{DMat3, DVec3};
 
 /// Longest step with one set of bounds, mm, where bone is near.
@@ -296,21 +296,18 @@ impl Ball {
         best
     }
 
-    /// Cuts towards the device as far as the load earns in `dt_ms`. Returns the volume, mm³.
-    pub fn drill(&mut self, bone: &mut Bone, device: DVec3, law: &RemovalLaw, dt_ms: f32) -> f64 {
+    /// Cuts towards the device as far as the load earns in `dt_ms`, held along `axis`. Returns the
+    /// volume, mm³.
+    pub fn drill(&mut self, bone: &mut Bone, (device, axis): (DVec3, DVec3), law: &RemovalLaw, dt_ms: f32) -> f64 {
         let pressed = device - self.centre;
-        let (Some(forward), RemovalLaw::Rate { cutting_ratio, stiffness, max_load_n, .. }) =
-            (pressed.try_normalize(), law)
-        else {
-            return 0.0;
-        };
-        let (radius_mm, depth_mm) = (self.radius as f32, pressed.length() as f32);
-        let torque = cutting_ratio * (stiffness * depth_mm).min(*max_load_n) * radius_mm;
-        let rpm = law.spindle().map_or(0.0, |spindle| spindle.turn(torque, &mut self.stalled));
+        let Some(forward) = pressed.try_normalize() else { return 0.0 };
+        let (load_mm, cosine) = (pressed.length() as f32, forward.dot(axis) as f32);
+        let at = Pressed { radius_mm: self.radius as f32, depth_mm: load_mm, cosine, dt_ms };
+        let (earned, rpm) = law.turned(&at, &mut self.stalled);
         if rpm <= 0.0 {
             return 0.0;
         }
-        let mut earned = f64::from(law.volume_mm3(radius_mm, depth_mm, dt_ms));
+        let mut earned = f64::from(earned);
         let (mut left, mut removed) = (pressed.length(), 0.0);
         while earned > 1e-12 && left > 1e-12 {
             let longest = left.min(CUT_MM);

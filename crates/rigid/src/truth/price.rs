@@ -1,13 +1,14 @@
 //! What bone costs by its density, from the law's documentation alone.
 
 use crate::removal::RemovalLaw;
+use trepan_measurements::skull;
 use trepan_volume::AIR_HU;
 
 /// Density at which a volume costs 1, HU.
-const REFERENCE_HU: f64 = 1500.0;
+const REFERENCE_HU: f64 = skull::DENSITY_OF_REFERENCE.value;
 /// Borders of the dental classes D3 and D1, HU. Between them the energy for a HU rises from that
 /// of cancellous to that of cortical bone.
-const RISES_HU: [f64; 2] = [350.0, 1250.0];
+const RISES_HU: [f64; 2] = [skull::DENSITY_CANCELLOUS.value, skull::DENSITY_CORTICAL.value];
 
 /// Price of a volume of `hu`: `∫ m(hu) dhu` from air, over the same at the reference density.
 pub fn price(law: &RemovalLaw, hu: f64) -> f64 {

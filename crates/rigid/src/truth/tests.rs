@@ -1,5 +1,5 @@
 use super::*;
-use crate::removal::RemovalLaw;
+use crate::removal::{Pressed, RemovalLaw};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -44,16 +44,17 @@ fn a_bore_goes_as_deep_and_takes_as_much_as_the_law_says() {
     let mut ball = Ball::new(R as f32, (R + 0.01) * OBLIQUE);
     let law = RemovalLaw::RATE;
     let (mut removed, mut at) = (0.0, Vec::new());
-    for tick in 0..4400 {
+    for tick in 0..6000 {
         let device = (R + 0.01 - 2e-3 * f64::from(tick)) * OBLIQUE;
         let lifted = ball.follow(&bone, device);
         assert!(lifted.reject_from(OBLIQUE).length() < 1e-4, "tick {tick}: {lifted}");
-        removed += ball.drill(&mut bone, device, &law, 2.0);
+        removed += ball.drill(&mut bone, (device, OBLIQUE), &law, 2.0);
         at.push((lifted.dot(OBLIQUE), removed, ball.centre().dot(OBLIQUE)));
     }
     let wanted = PI * R * R * 1e-3;
-    let steady = (0..4000).map(|n| 5e-4 * n as f32).find(|d| f64::from(law.volume_mm3(R as f32, *d, 1.0)) > wanted);
-    let (early, late) = (at[3900], at[4399]);
+    let law_at = |depth_mm: f32| Pressed { radius_mm: R as f32, depth_mm, cosine: 1.0, dt_ms: 1.0 };
+    let steady = (0..4000).map(|n| 5e-4 * n as f32).find(|d| f64::from(law.volume_mm3(&law_at(*d))) > wanted);
+    let (early, late) = (at[5500], at[5999]);
     assert!((late.0 - f64::from(steady.unwrap())).abs() < 0.005, "{} {steady:?}", late.0);
     let volume = (late.1 - early.1) / (PI * R * R * (early.2 - late.2));
     assert!((volume - 1.0).abs() < 0.003, "{volume}");
@@ -121,7 +122,7 @@ fn a_burr_comes_out_of_its_bore() {
     for tick in 0..1500 {
         let device = (3.5 - 4e-3 * f64::from(tick)) * OBLIQUE;
         ball.follow(&bone, device);
-        ball.drill(&mut bone, device, &RemovalLaw::RATE, 4.0);
+        ball.drill(&mut bone, (device, OBLIQUE), &RemovalLaw::RATE, 4.0);
     }
     for tick in 0..60 {
         // Poses are f32: a hand's noise is some nanometres.

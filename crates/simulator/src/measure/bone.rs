@@ -155,7 +155,8 @@ impl<'a> Stretch<'a> {
             let device = tool.tip().as_dvec3();
             let lifted = ball.follow(&bone, device);
             if cuts {
-                ball.drill(&mut bone, device, &law, 1.0);
+                let axis = (tool.world_from_tool.rotation * Vec3::Z).as_dvec3();
+                ball.drill(&mut bone, (device, axis), &law, 1.0);
             }
             (scene.stiffness * lifted).as_vec3()
         };

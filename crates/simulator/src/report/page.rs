@@ -3,6 +3,7 @@
 
 use crate::error::SessionError;
 use crate::constants;
+use crate::force_scale::ForceScale;
 use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time};
@@ -115,7 +116,7 @@ fn events(outcome: &Outcome, recording: &Recording) -> Vec<Event> {
 /// Kind of the events of a teacher's requests.
 const TEACHER: &str = "teacher";
 
-fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 5], SessionError> {
+fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 6], SessionError> {
     let Recording { ticks, second, solver, .. } = recording;
     let of = |name, value: fn(&TickRecord) -> f32| Curve::over_time(name, ticks, |t| (t.time_ms, value(t)));
     let moved = Curve::over_time("largest displacement", solver, |s| (s.time_ms, s.max_displacement_mm));
@@ -128,8 +129,11 @@ fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 5], Sessio
     let depths = [of("in bone", |t| t.depth_mm), of("in tissue", |t| t.tissue_depth_mm)];
     let near = of("tool to brain", |t| t.brain_distance_mm.clamp(-10.0, 20.0));
     let times = outcome.ticks.times.bins();
+    let scale = ForceScale(if outcome.force_scale > 0.0 { outcome.force_scale } else { 1.0 });
+    let task = Curve::over_time("force of the task", ticks, |t| (t.time_ms, scale.task_n(t)));
     Ok([
         Chart::new("Force on the hand", over_time("force, N", &forces, limit)?),
+        Chart::new(format!("Force of the task: {}", scale.text()), over_time("force of the task, N", &[task], None)?),
         Chart::new("Depth of the tool", over_time("depth, mm", &depths, None)?),
         Chart::new("Distance to the brain at rest (cut at 20 mm)", over_time("distance, mm", &[near], None)?),
         Chart::new("Brain", over_time("displacement, mm", &[moved], None)?),

@@ -141,6 +141,10 @@ pub struct Forces {
     pub max_step: f32,
     /// Force after the last tick, N.
     pub end: f32,
+    /// Largest force of bone in newtons of the task.
+    pub task_max: f32,
+    /// Newtons at the hand per newton of the task, on bone.
+    pub scale: f32,
 }
 
 /// Results of the second hand.
@@ -207,11 +211,13 @@ impl Summary {
                 max: outcome.scores.peak_force_n,
                 max_step: outcome.scores.peak_force_step_n,
                 end: outcome.end_force_n,
+                task_max: outcome.scores.peak_bone_force_n / outcome.force_scale.max(1e-3),
+                scale: outcome.force_scale,
             },
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
             warnings: warnings(outcome),
             scores: outcome.scores,
-            bands: Bands::of(&outcome.scores),
+            bands: Bands::of(&outcome.scores, outcome.force_scale),
             guard: outcome.guard,
             second: outcome.second.map(|outcome| SecondSummary { outcome, ..self.second.unwrap_or_default() }),
             replay: outcome.replayed.clone(),

@@ -12,6 +12,7 @@ pub(crate) mod stop;
 pub(crate) mod threads;
 pub(crate) mod watch;
 
+use crate::force_scale::ForceScale;
 use crate::run::film::Shot;
 use crate::run::journal::Written;
 use crate::run::stop::Stop;
@@ -74,6 +75,10 @@ pub(crate) struct View {
     pub force: Vec3,
     /// Largest force that the guard lets through, N.
     pub force_limit_n: f32,
+    /// Force of the task, N.
+    pub task_n: f32,
+    /// Newtons at the hand per newton of the task, on bone.
+    pub force_scale: ForceScale,
     /// The second hand, if there is one.
     pub second: Option<SecondView>,
     /// Depth in bone and tissue, mm.
@@ -102,6 +107,8 @@ impl View {
             time_ms: 0.0,
             force: Vec3::ZERO,
             force_limit_n,
+            task_n: 0.0,
+            force_scale: ForceScale(1.0),
             second: None,
             depth_mm: [0.0; 2],
             brain_distance_mm: f32::INFINITY,
@@ -265,6 +272,8 @@ impl Ticks {
             time_ms: tick.record.time_ms,
             force: tick.wrench.force(),
             force_limit_n: stage.guard().config().max_force_n,
+            task_n: stage.force_scale().task_n(&tick.record),
+            force_scale: stage.force_scale(),
             second,
             depth_mm: [tick.record.depth_mm, tick.record.tissue_depth_mm],
             brain_distance_mm: tick.record.brain_distance_mm,
@@ -359,6 +368,8 @@ pub(crate) struct Outcome {
     pub guard: GuardCounters,
     /// Force limit of the guard, N.
     pub force_limit_n: f32,
+    /// Newtons at the hand per newton of the task, on bone; 0 before a run.
+    pub force_scale: f32,
     /// Force after the last tick, N; zero after a clean end.
     pub end_force_n: f32,
     /// The second hand, if there is one.
@@ -378,6 +389,7 @@ impl Outcome {
             scores: *stage.scores(),
             guard: stage.guard().counters(),
             force_limit_n: stage.guard().config().max_force_n,
+            force_scale: stage.force_scale().0,
             second: second.map(SecondHand::outcome),
             ..Self::default()
         }

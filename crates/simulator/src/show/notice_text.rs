@@ -26,6 +26,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let sample = &view.sample;
     let [_, late, held] = view.counts;
     let values = [
+        value("force of the task", format!("{:.1} N", view.task_n)),
+        value("scale", view.force_scale.text()),
         value("depth in bone", format!("{:.2} mm", view.depth_mm[0])),
         value("depth in tissue", format!("{:.2} mm", view.depth_mm[1])),
         value("tool to brain", format!("{:.1} mm", view.brain_distance_mm)),

@@ -7,13 +7,14 @@
 
 use crate::stages::ahead::bone_ahead_mm;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
+use trepan_measurements::drilling;
 use trepan_rigid::RigidStep;
 use trepan_volume::BoneVolume;
 
 /// Remaining bone under which a warning is raised, mm.
-pub(crate) const THIN_MM: f32 = 1.0;
+pub(crate) const THIN_MM: f32 = drilling::THIN_BONE.f32();
 /// Remaining bone at which the burr is about to break through, mm.
-pub(crate) const BREAK_MM: f32 = 0.3;
+pub(crate) const BREAK_MM: f32 = drilling::BREAK_THROUGH.f32();
 
 /// The present stroke.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,12 +4,14 @@ use crate::ingredients::Ingredients;
 use crate::program::Program;
 use crate::stages::alarms::Limits;
 use trepan_contact::{ForceShading, Friction, GuardConfig, Vibration, Viscoelastic};
-use trepan_rigid::Method;
+use trepan_measurements::drilling;
+use trepan_rigid::{Method, removal::FORCE_SCALE};
 
 /// Stiffness of the contact with bone, N/mm.
-pub(crate) const BONE_STIFFNESS: f32 = 2.0;
+pub(crate) const BONE_STIFFNESS: f32 = drilling::CONTACT_STIFFNESS.f32();
 /// Contact with bone of a hand that no device limits.
-pub(crate) const BONE: Viscoelastic = Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 };
+pub(crate) const BONE: Viscoelastic =
+    Viscoelastic { stiffness: BONE_STIFFNESS, damping: drilling::CONTACT_DAMPING_UNLIMITED.f32() };
 /// Contact with tissue of a hand that no device limits.
 pub(crate) const TISSUE: Viscoelastic = Viscoelastic { stiffness: 0.3, damping: 0.3 };
 
@@ -20,6 +22,8 @@ pub struct HapticConfig {
     pub program: Program,
     /// Method of contact with bone.
     pub rigid: Method,
+    /// Newtons at the hand per newton of the task, on bone.
+    pub force_scale: f32,
     /// Length of a tick, ms.
     pub dt_ms: f32,
     /// Force of bone: k in N/mm, b in N ms/mm, with friction, shading and the drill's vibration.
@@ -44,6 +48,7 @@ impl HapticConfig {
         Self {
             program,
             rigid: Method::RECOMMENDED,
+            force_scale: FORCE_SCALE,
             dt_ms: 1.0,
             bone_force: bone_force(BONE, &Ingredients::default(), 0.0),
             tissue_force: TISSUE,

@@ -50,12 +50,17 @@ pub struct ScoreKeeper {
     pub peak_tissue_depth_mm: f32,
     /// Largest force on the hand, N.
     pub peak_force_n: f32,
+    /// Largest force of bone on the hand, N.
+    pub peak_bone_force_n: f32,
     /// Largest change of force between two ticks, N.
     pub peak_force_step_n: f32,
     /// How far the hand was past the brain's rest surface at the largest force of the tissue, and
     /// how deep in its present surface, mm.
     #[serde(skip)]
     pub(crate) peak_tissue: [f32; 2],
+    /// Force of bone on the hand while it is cut, integrated over time, N s, and that time, s.
+    #[serde(skip)]
+    pub(crate) cutting: [f64; 2],
     #[serde(skip)]
     motion: Motion,
     #[serde(skip)]
@@ -94,12 +99,17 @@ impl ScoreKeeper {
         self.tool_changes += u32::from(record.tool != self.tool);
         self.tool = record.tool;
         self.peak_force_n = self.peak_force_n.max(force.length());
+        self.peak_bone_force_n = self.peak_bone_force_n.max((force - record.tissue_force).length());
         self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
         self.last_force = force;
         self.bone_removed_mm3 += f64::from(record.removed_mm3);
         self.times_through += u32::from(record.has(TickRecord::THROUGH));
         if record.has(TickRecord::DRILLING) {
             self.drilling_s += seconds;
+            if record.depth_mm > 0.0 {
+                let bone_n = f64::from((force - record.tissue_force).length());
+                self.cutting = [self.cutting[0] + seconds * bone_n, self.cutting[1] + seconds];
+            }
         }
         if record.phase == 0 {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);

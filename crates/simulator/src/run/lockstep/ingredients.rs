@@ -64,7 +64,7 @@ fn setup(line: &str, recording: Option<&Recording>) -> SessionSetup {
 }
 
 fn stages(setup: &SessionSetup) -> Stages {
-    let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
+    let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0, None);
     setup.stages(hand(0), 1.0, (&limits, None)).unwrap()
 }
 

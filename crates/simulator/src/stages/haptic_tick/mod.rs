@@ -25,6 +25,7 @@
 
 mod requests;
 
+use crate::force_scale::ForceScale;
 use crate::program::Phase;
 use crate::stages::alarms::{Feed, WarningInputs};
 use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm};
@@ -40,6 +41,7 @@ use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardedWrench, Sur
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
+use trepan_rigid::spindle::Spindle;
 use trepan_rigid::{RigidContact, RigidStep};
 use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
@@ -269,7 +271,17 @@ impl HapticStage {
 
     /// Returns the speed of the spindle in a tick over its free speed.
     pub fn spindle_share(&self, record: &TickRecord) -> f32 {
-        self.config.rigid.removal().spindle().map_or(0.0, |spindle| record.spindle_rpm / spindle.free_rpm)
+        self.spindle().map_or(0.0, |spindle| record.spindle_rpm / spindle.free_rpm)
+    }
+
+    /// Returns the newtons at the hand per newton of the task, on bone.
+    pub(crate) fn force_scale(&self) -> ForceScale {
+        ForceScale(self.config.force_scale)
+    }
+
+    /// Returns the motor of the present tool.
+    fn spindle(&self) -> Option<Spindle> {
+        self.config.rigid.removal().for_tool(&self.tool()).spindle()
     }
 
     /// Switches the force off after a fault of the device until a deliberate action of the user.
@@ -307,7 +319,7 @@ impl HapticStage {
     /// Returns the speed of the spindle, 1/min: the free speed in air, reduced by the load in bone,
     /// 0 while not drilling.
     fn spindle_rpm(&self, drilling: bool) -> f32 {
-        match self.config.rigid.removal().spindle() {
+        match self.spindle() {
             Some(_) if drilling && self.bone_step.manifold.touches() => self.bone_step.spindle_rpm,
             Some(spindle) if drilling => spindle.free_rpm,
             _ => 0.0,
@@ -343,7 +355,7 @@ impl HapticStage {
     /// Returns the desired wrenches of bone, and of tissue in the brain phase only (thesis 6.4:
     /// while drilling, tissue only causes warnings).
     fn desired_wrench(&mut self, tool: &ToolState, drilling: bool) -> DesiredWrench {
-        let free = self.config.rigid.removal().spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
+        let free = self.spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
         self.config.bone_force.turn(self.spindle_rpm(drilling) / free);
         let dt_ms = self.config.dt_ms;
         let bone = self.config.bone_force.wrench(tool, &self.bone_step.manifold, dt_ms);

@@ -79,7 +79,8 @@ impl Felt {
                 felt.drilling.push(drilling);
             }
             if drilling {
-                ball.drill(&mut bone, device, &law, 1.0 / ticks_per_ms as f32);
+                let axis = (tool.world_from_tool.rotation * Vec3::Z).as_dvec3();
+                ball.drill(&mut bone, (device, axis), &law, 1.0 / ticks_per_ms as f32);
             }
         }
         felt

@@ -185,7 +185,7 @@ fn stroke(scope: Scope, radius_mm: f32, task: Task, findings: &mut Findings) {
     let truth = hand(&site, task, radius_mm, |device, works| {
         let lifted = ball.follow(&exact, device);
         if works {
-            ball.drill(&mut exact, device, &RemovalLaw::RATE, 1.0);
+            ball.drill(&mut exact, (device, site.outward), &RemovalLaw::RATE, 1.0);
         }
         lifted
     });

@@ -24,7 +24,7 @@ use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use glam::DVec3;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
-use trepan_rigid::removal::RemovalLaw;
+use trepan_rigid::removal::{Pressed, RemovalLaw};
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -371,7 +371,8 @@ fn steady_mm() -> f64 {
     let (mut low, mut high) = (0.0f32, 3.0f32);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        let less = RemovalLaw::RATE.volume_mm3(BALL_MM as f32, middle, 1.0) < wanted;
+        let pressed = Pressed { radius_mm: BALL_MM as f32, depth_mm: middle, cosine: 1.0, dt_ms: 1.0 };
+        let less = RemovalLaw::RATE.volume_mm3(&pressed) < wanted;
         (low, high) = if less { (middle, high) } else { (low, middle) };
     }
     low.into()
