@@ -1,8 +1,8 @@
 //! `report.html`: a self-contained page on a session with pictures, curves from the recording,
 //! scores and the machine.
 
-use crate::error::SessionError;
 use crate::constants;
+use crate::error::SessionError;
 use crate::force_scale::ForceScale;
 use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};

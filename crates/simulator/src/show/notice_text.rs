@@ -123,7 +123,8 @@ mod tests {
     #[test]
     fn a_press_shows_the_band_of_its_force() {
         let mut view = View { depth_mm: [0.0, 1.0], brain_distance_mm: -4.0, ..view(0) };
-        let shown = |view: &View| panel("c", Program::Integrated, view).values.iter().any(|(_, text)| text.contains(" to "));
+        let shown =
+            |view: &View| panel("c", Program::Integrated, view).values.iter().any(|(_, text)| text.contains(" to "));
         assert!(!shown(&view), "a burr");
         view.sample.tool = Program::Brain.tray()[0];
         assert!(shown(&view));

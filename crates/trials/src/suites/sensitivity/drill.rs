@@ -57,11 +57,8 @@ pub fn scene() -> Scene {
 fn law([energy, edge_um, edges, ratio, speed, power, cancellous]: [f64; 7]) -> RemovalLaw {
     let RemovalLaw::Rate { cutter, perforator, stiffness, max_load_n, .. } = RemovalLaw::RATE else { unreachable!() };
     let slower = speed as f32 / cutter.spindle.free_rpm;
-    let spindle = Spindle {
-        free_rpm: speed as f32,
-        power_w: power as f32,
-        stall_rpm: slower * cutter.spindle.stall_rpm,
-    };
+    let spindle =
+        Spindle { free_rpm: speed as f32, power_w: power as f32, stall_rpm: slower * cutter.spindle.stall_rpm };
     let cutter = Cutter {
         spindle,
         cutting_ratio: ratio as f32,

@@ -100,7 +100,8 @@ mod tests {
 
     #[test]
     fn the_strongest_comes_first_and_an_output_that_nothing_changes_breaks_a_limit() {
-        let mut findings = Findings { rows: vec![row("weak", 3.0, f64::NAN), row("strong", 80.0, 71.0)], ..Findings::default() };
+        let mut findings =
+            Findings { rows: vec![row("weak", 3.0, f64::NAN), row("strong", 80.0, 71.0)], ..Findings::default() };
         findings.rows.push(Row::new("closed forms", "sobol").metric("index_error", 0.01));
         judge(Scope { quick: true, seed: 1 }, &mut findings);
         assert_eq!(findings.tables[0].rows[0][0], "strong");

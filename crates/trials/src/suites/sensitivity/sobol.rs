@@ -62,9 +62,8 @@ pub fn shares<const OUT: usize>(
     mut f: impl FnMut(&[f64]) -> [f64; OUT],
 ) -> [Shares; OUT] {
     let mut sampled: [Vec<Sampled>; OUT] = std::array::from_fn(|_| Vec::with_capacity(rows));
-    let number = |row: usize, dimension: usize| {
-        f64::from(sobol_burley::sample(row as u32, dimension as u32, seed as u32))
-    };
+    let number =
+        |row: usize, dimension: usize| f64::from(sobol_burley::sample(row as u32, dimension as u32, seed as u32));
     for row in 0..rows {
         let [a, b] = [0, inputs].map(|from| (from..from + inputs).map(|d| number(row, d)).collect::<Vec<_>>());
         let (of_a, of_b) = (f(&a), f(&b));
@@ -127,9 +126,8 @@ fn estimate(sampled: &[&Sampled], inputs: usize) -> Vec<Indices> {
 /// with a of 0, 1, 4.5, 9.
 pub fn error_on_closed_forms(rows: usize, seed: u64) -> f64 {
     let worst = |found: &Shares, truth: &[[f64; 2]]| {
-        let off = |(found, truth): (&Indices, &[f64; 2])| {
-            (found.first - truth[0]).abs().max((found.total - truth[1]).abs())
-        };
+        let off =
+            |(found, truth): (&Indices, &[f64; 2])| (found.first - truth[0]).abs().max((found.total - truth[1]).abs());
         found.indices.iter().zip(truth).map(off).fold(0.0, f64::max)
     };
     let [ishigami] = shares(3, rows, seed, |x| {
