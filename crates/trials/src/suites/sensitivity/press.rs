@@ -47,10 +47,13 @@ pub fn scene() -> Scene {
 
 /// Brain of a shear modulus, MPa, a compressibility `0.5 - ν` and a density, g/mm³.
 pub fn brain(shear_mpa: f64, compressibility: f64, density: f64) -> Material {
-    let (poisson, density_g_mm3) = (0.5 - compressibility as f32, density as f32);
-    let usual = TissueClass::Brain.material(YOUNG_MPA);
-    let young_mpa = YOUNG_MPA * (shear_mpa / usual.shear_mpa()) as f32 * (1.0 + poisson) / (1.0 + usual.poisson());
-    Material::NeoHookean { young_mpa, poisson, density_g_mm3 }
+    let (poisson, density_g_mm3, shear_mpa) = (0.5 - compressibility as f32, density as f32, shear_mpa as f32);
+    match TissueClass::Brain.material(YOUNG_MPA) {
+        Material::Stiffening { share, bound, .. } => {
+            Material::Stiffening { shear_mpa, share, bound, poisson, density_g_mm3 }
+        }
+        _ => Material::NeoHookean { young_mpa: 2.0 * shear_mpa * (1.0 + poisson), poisson, density_g_mm3 },
+    }
 }
 
 /// Settings of the solver as `--quality auto` runs it.
