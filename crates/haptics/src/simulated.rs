@@ -31,6 +31,7 @@ use crate::scripted::operation_name;
 use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, Opened, Reading};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Vec3, Wrench};
+use trepan_measurements::hands;
 
 /// `simulated:NAME`: a Touch in a firm hand that follows a scripted operation.
 pub static DEVICE: Descriptor = Descriptor {
@@ -110,9 +111,17 @@ impl HandModel {
     /// No hand: the device moves freely.
     pub const FREE: Self = Self { mass_g: 0.0, damping: 0.0, stiffness: 0.0 };
     /// A light grip.
-    pub const LIGHT: Self = Self { mass_g: 50.0, damping: 2.0, stiffness: 0.15 };
+    pub const LIGHT: Self = Self {
+        mass_g: hands::LIGHT_GRIP_MASS.f32(),
+        damping: hands::LIGHT_GRIP_DAMPING.f32(),
+        stiffness: hands::LIGHT_GRIP_STIFFNESS.f32(),
+    };
     /// A firm grip.
-    pub const FIRM: Self = Self { mass_g: 150.0, damping: 5.0, stiffness: 0.4 };
+    pub const FIRM: Self = Self {
+        mass_g: hands::FIRM_GRIP_MASS.f32(),
+        damping: hands::FIRM_GRIP_DAMPING.f32(),
+        stiffness: hands::FIRM_GRIP_STIFFNESS.f32(),
+    };
 }
 
 /// A simulated device whose hand follows the pose of another device.

@@ -244,41 +244,42 @@ fn layers(findings: &mut Findings) {
     findings.series.push(Series::over(title, axes, named));
 }
 
-/// How far past the far side a drill goes that is let go a reaction time after the bone's force has
-/// fallen to half, mm.
+/// How far past the far side a drill goes that is let go a reaction time after a hand notices that
+/// the bone's force falls, mm.
 fn plunge_mm(reaction_ms: f64) -> f64 {
     let (thick_mm, radius_mm) = (2.0f32, 1.5f32);
     let bone = slab(thick_mm, |_| skull::DENSITY_OF_REFERENCE.f32());
     let mut contact = Method::RECOMMENDED.build(&Tool::burr(radius_mm));
     contact.reset(Pose::from_translation(Vec3::Z * radius_mm));
-    let mut out = RigidStep::default();
+    let (mut out, mut through, mut noticed) = (RigidStep::default(), false, None);
     let pressed_n = hands::DRILLING_FORCE.value;
     let [mass, damping, spring] =
         [hands::DRILLING_ARM_MASS, hands::DRILLING_ARM_DAMPING, hands::DRILLING_ARM_STIFFNESS].map(|row| row.value);
     let (mut depth, mut speed) = (-f64::from(radius_mm) + pressed_n / f64::from(stiffness()), 0.0);
-    let (mut gave_way, mut deepest): (Option<(f64, f64)>, f64) = (None, 0.0);
     for ms in 0..30_000 {
         let device = Vec3::NEG_Z * depth as f32;
         contact.step(&bone, &ToolState::at(Pose::from_translation(device)), true, 1.0, &mut out);
         let bone_n = f64::from(stiffness() * out.manifold.depth_mm * out.manifold.normal.z);
-        deepest = f64::from(radius_mm - thick_mm) - f64::from(contact.proxy().translation.z);
-        let inside = ms > 200 && out.broke_through;
-        gave_way = gave_way.or((inside && bone_n < pressed_n).then_some((f64::from(ms), depth)));
-        let push_n = match gave_way {
-            Some((since, _)) if f64::from(ms) - since > reaction_ms => return deepest,
+        through |= out.broke_through;
+        let falls = through && bone_n < hands::DRILLING_NOTICE_SHARE.value * pressed_n;
+        noticed = noticed.or(falls.then_some((f64::from(ms), depth)));
+        let push_n = match noticed {
+            Some((since, _)) if f64::from(ms) - since > reaction_ms => {
+                return f64::from(radius_mm - thick_mm - contact.proxy().translation.z);
+            }
             Some((_, from)) => pressed_n - spring * (depth - from),
             None => pressed_n,
         };
         speed += (push_n - bone_n - damping * speed) / mass;
         depth += speed;
     }
-    deepest
+    f64::NAN
 }
 
 fn plunges(findings: &mut Findings) {
     let [touch, sound, sight] =
         [hands::REACTION_TOUCH, hands::REACTION_SOUND, hands::REACTION_SIGHT].map(|row| plunge_mm(row.value));
-    let late = "novices press harder, and go on pressing: 14 N and a reaction to sight explain two thirds of it";
+    let late = "novices press harder and go on pressing; 14 N and a reaction to sight explain two thirds of it";
     let harder = "six people with a 4.5 mm bit, which needs more force than the 14 N of the mean; the force was not \
                   measured";
     let compared = [
@@ -304,71 +305,93 @@ fn plunges(findings: &mut Findings) {
     findings.series.push(Series::over("Plunge against reaction time", ["reaction time, ms", "plunge, mm"], named));
 }
 
-/// A site of the vault: a direction from the middle of the head, right, anterior and superior.
-struct Site {
-    towards: DVec3,
-    thickness: &'static Row,
-}
-
-/// What a ray through the vault meets.
+/// What a line through the vault meets.
 #[derive(Clone, Copy)]
-struct Ray {
+struct Chord {
     thick_mm: f64,
     mean_hu: f64,
     greatest_hu: f64,
 }
 
+/// Sites by their direction from the middle of the head, right, anterior and superior: midway from
+/// nasion to coronal suture, parietal eminence, anterior temporal bone, midway from mastoid to
+/// occipital protuberance, temporal squama.
+const SITES: [[f64; 3]; 5] =
+    [[0.0, 1.0, 0.5], [0.8, -0.35, 0.6], [1.0, 0.35, -0.2], [0.5, -1.0, -0.4], [1.0, 0.1, -0.2]];
+/// How far the middle of the head lies under its top, mm.
+const MIDDLE_MM: f64 = 70.0;
+
 fn vault(findings: &mut Findings) {
     let (ct, isovalue) = head();
-    let (low, high) = ct.world_corners();
-    let middle = (0.5 * (low + high)).with_z(high.z - MIDDLE_MM);
-    let along = |towards: DVec3| -> Vec<Ray> {
-        let towards = towards.normalize();
-        let (a, b) = towards.any_orthonormal_pair();
-        let offsets = (-4..=4).flat_map(|i| (-4..=4).map(move |j| (0.02 * f64::from(i), 0.02 * f64::from(j))));
-        offsets.filter_map(|(i, j)| ray(&ct, isovalue, middle, (towards + i * a + j * b).normalize())).collect()
-    };
-    let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-    };
-    let thick = |towards: DVec3| median(along(towards).iter().map(|ray| ray.thick_mm).collect());
-    let sites = [
-        Site { towards: DVec3::new(0.25, 1.0, 0.55), thickness: &skull::THICKNESS_FRONTAL },
-        Site { towards: DVec3::new(0.85, -0.35, 0.6), thickness: &skull::THICKNESS_PARIETAL },
-        Site { towards: DVec3::new(1.0, 0.25, 0.0), thickness: &skull::THICKNESS_TEMPORAL },
-        Site { towards: DVec3::new(0.45, -1.0, -0.1), thickness: &skull::THICKNESS_OCCIPITAL },
+    let ct = Scan { ct: &ct, isovalue: isovalue.into() };
+    let (low, high) = ct.ct.world_corners();
+    let top = ct.outermost(0.5 * (low + high), DVec3::Z).map_or(f64::NAN, |top| top.z);
+    let middle = (0.5 * (low + high)).with_z(top - MIDDLE_MM);
+    let [frontal, parietal, temporal, occipital, squama] = SITES.map(|site| ct.site(middle, DVec3::from(site)));
+    let one_head = "one head, whose CT documents only the ratio of its voxels' sides, so that lengths are nominal; the \
+                    site is that of a direction from the middle of the head";
+    let uncalibrated = "the built-in CT's densities are stored values less 1024, never calibrated, and slices of 2 mm \
+                        blur thin tables";
+    let compared = [
+        Comparison::of(&skull::THICKNESS_FRONTAL, How::Predicted, frontal.thick_mm).why(one_head),
+        Comparison::of(&skull::THICKNESS_PARIETAL, How::Predicted, parietal.thick_mm).why(one_head),
+        Comparison::of(&skull::THICKNESS_TEMPORAL, How::Predicted, temporal.thick_mm).why(one_head),
+        Comparison::of(&skull::THICKNESS_OCCIPITAL, How::Predicted, occipital.thick_mm).why(one_head),
+        Comparison::of(&skull::DENSITY_TEMPORAL_CORTEX, How::Predicted, squama.greatest_hu).why(uncalibrated),
+        Comparison::of(&skull::DENSITY_DENSEST_SITE, How::Predicted, squama.mean_hu).why(uncalibrated),
     ];
-    let one_head = "one head, and the site by its direction from the middle of the head alone";
-    let of_sites = sites.map(|site| Comparison::of(site.thickness, How::Predicted, thick(site.towards)).why(one_head));
-    let temporal = along(DVec3::new(1.0, 0.1, 0.1));
-    let cortex = median(temporal.iter().map(|ray| ray.greatest_hu).collect());
-    let squama = median(temporal.iter().map(|ray| ray.mean_hu).collect());
-    let blurred = "the built-in CT has voxels wider than the tables, which blur their density with that of what is \
-                   beside them";
-    let of_density = [
-        Comparison::of(&skull::DENSITY_TEMPORAL_CORTEX, How::Predicted, cortex).why(blurred),
-        Comparison::of(&skull::DENSITY_DENSEST_SITE, How::Predicted, squama).why(blurred),
-    ];
-    findings.rows.extend(of_sites.iter().chain(&of_density).map(Comparison::row));
+    findings.rows.extend(compared.iter().map(Comparison::row));
 }
 
-/// How far the middle of the head lies under its top, mm.
-const MIDDLE_MM: f64 = 80.0;
+/// A CT with the density at which bone begins, HU.
+struct Scan<'a> {
+    ct: &'a VoxelVolume<i16>,
+    isovalue: f64,
+}
 
-/// The outermost bone that a ray outwards from the middle of the head meets.
-fn ray(ct: &VoxelVolume<i16>, isovalue: i16, middle: DVec3, towards: DVec3) -> Option<Ray> {
-    let hu = |mm: f64| density(ct, middle + mm * towards);
-    let is_bone = |n: i32| hu(RAY_MM * f64::from(n)) >= f64::from(isovalue);
-    let reach = (130.0 / RAY_MM) as i32;
-    let outer = (0..reach).rev().find(|n| is_bone(*n))?;
-    let inner = (0..outer).rev().find(|n| !is_bone(*n) && !(1..40).any(|back| is_bone(n - back)))? + 1;
-    let inside: Vec<f64> = (inner..=outer).map(|n| hu(RAY_MM * f64::from(n))).collect();
-    Some(Ray {
-        thick_mm: RAY_MM * f64::from(outer - inner),
-        mean_hu: inside.iter().sum::<f64>() / inside.len() as f64,
-        greatest_hu: inside.iter().copied().fold(f64::MIN, f64::max),
-    })
+impl Scan<'_> {
+    /// Medians over a patch of the vault: thickness in the axial plane as in the published
+    /// measurements, and densities along it.
+    fn site(&self, middle: DVec3, towards: DVec3) -> Chord {
+        let towards = towards.normalize();
+        let (a, b) = towards.any_orthonormal_pair();
+        let offsets = (-2..=2).flat_map(|i| (-2..=2).map(move |j| (0.05 * f64::from(i), 0.05 * f64::from(j))));
+        let chord = |(i, j): (f64, f64)| {
+            let outer = self.outermost(middle, (towards + i * a + j * b).normalize())?;
+            let inward = (middle - outer).with_z(0.0).normalize();
+            let turned = (-8..=8).map(|n| glam::DQuat::from_rotation_z(0.1 * f64::from(n)) * inward);
+            turned.map(|way| self.chord(outer, way)).min_by(|p, q| p.thick_mm.total_cmp(&q.thick_mm))
+        };
+        let chords: Vec<Chord> = offsets.filter_map(chord).collect();
+        let median = |of: fn(&Chord) -> f64| {
+            let mut values: Vec<f64> = chords.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        Chord {
+            thick_mm: median(|chord| chord.thick_mm),
+            mean_hu: median(|chord| chord.mean_hu),
+            greatest_hu: median(|chord| chord.greatest_hu),
+        }
+    }
+
+    /// Where a ray outwards leaves the last bone.
+    fn outermost(&self, from: DVec3, towards: DVec3) -> Option<DVec3> {
+        let places = (0..2600).rev().map(|n| from + RAY_MM * f64::from(n) * towards);
+        places.into_iter().find(|place| density(self.ct, *place) >= self.isovalue)
+    }
+
+    /// The bone along a way inwards, up to 3 mm without any.
+    fn chord(&self, outer: DVec3, inward: DVec3) -> Chord {
+        let along: Vec<f64> = (0..700).map(|n| density(self.ct, outer + RAY_MM * f64::from(n) * inward)).collect();
+        let ends = |n: &usize| along[*n..*n + 60].iter().all(|hu| *hu < self.isovalue);
+        let bone = &along[..(1..640).find(ends).unwrap_or(640)];
+        Chord {
+            thick_mm: RAY_MM * bone.len() as f64,
+            mean_hu: bone.iter().sum::<f64>() / bone.len() as f64,
+            greatest_hu: bone.iter().copied().fold(f64::MIN, f64::max),
+        }
+    }
 }
 
 /// Trilinear density, HU; air outside.
