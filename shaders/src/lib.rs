@@ -41,16 +41,17 @@ macro_rules! tled {
 }
 
 /// Nodal forces of tetrahedra by constitutive law: neo-Hookean, St. Venant-Kirchhoff,
-/// Mooney-Rivlin, Ogden. They require `const RELAXES` and `const CURES` before them.
-pub const TLED_FORCES: [&str; 4] = [
+/// Mooney-Rivlin, Ogden, stiffening. They require `const RELAXES` and `const CURES` before them.
+pub const TLED_FORCES: [&str; 5] = [
     tled!("element.wgsl", "neo_hookean.wgsl", "forces.wgsl"),
     tled!("element.wgsl", "st_venant_kirchhoff.wgsl", "forces.wgsl"),
     tled!("element.wgsl", "mooney_rivlin.wgsl", "forces.wgsl"),
     tled!("element.wgsl", "ogden.wgsl", "forces.wgsl"),
+    tled!("element.wgsl", "stiffening.wgsl", "forces.wgsl"),
 ];
 /// Volume change of every tetrahedron, and its mean around the nodes.
 pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("node_groups.wgsl")];
 /// The contact springs on the tissue surface.
-pub const TLED_PRESS: &str = tled!("press.wgsl");
+pub const TLED_PRESS: &str = tled!("fluid.wgsl", "press.wgsl");
 /// Sums the forces at nodes and integrates their motion.
-pub const TLED_UPDATE: &str = tled!("update.wgsl");
+pub const TLED_UPDATE: &str = tled!("fluid.wgsl", "update.wgsl");

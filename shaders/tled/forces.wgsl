@@ -10,7 +10,7 @@ struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
 // Further constants of the laws that have more than two.
 @group(0) @binding(5) var<storage, read> more: array<vec4f>;
-// Past stress: two terms of six numbers, all elements each.
+// Past stress: three terms of six numbers, all elements each.
 @group(0) @binding(6) var<storage, read_write> memory: array<f32>;
 @group(0) @binding(7) var<storage, read> volume_change: array<f32>;
 @group(0) @binding(8) var<uniform> range: Range;
@@ -19,6 +19,8 @@ struct Range { first: u32, count: u32 }
 struct Stress {
     s: array<f32, 6>,
     q: f32,
+    // A bound of the law's own stiffening beyond s.
+    stiffening: f32,
 }
 
 // J^n continued linearly below J = 0.3, and its slope, from `at` = max(J, 0.3)^n.
@@ -51,7 +53,7 @@ fn stiffness(stress: Stress, m: vec2f, d: Deformation, swollen: f32) -> f32 {
     let i1 = dot(d.f[0], d.f[0]) + dot(d.f[1], d.f[1]) + dot(d.f[2], d.f[2]);
     let volume = m.y * (1.0 + resistance(d).y) + 5.0 / 9.0 * m.x * i1 * (inverse * inverse * d.root * d.root);
     let turning = abs(stress.q + m.y * swollen) * sqrt(i1);
-    return abs(s[0]) + abs(s[1]) + abs(s[2]) + off + off + volume * largest_eigenvalue(d.cof) + turning;
+    return abs(s[0]) + abs(s[1]) + abs(s[2]) + off + off + stress.stiffening + volume * largest_eigenvalue(d.cof) + turning;
 }
 
 // Lets the memory take up the isochoric stress and takes the memory off it.
@@ -61,7 +63,7 @@ fn relaxed(e: u32, stress: Stress, d: Deformation) -> Stress {
     let green = squared_rows(d.cof);
     for (var k = 0u; k < 6u; k++) {
         let whole = stress.s[k] + stress.q * (green[k] * inverse);
-        for (var term = 0u; term < 2u; term++) {
+        for (var term = 0u; term < 3u; term++) {
             let at = (6u * term + k) * now.elements + e;
             let kept = now.fade_keep[term] * memory[at] + now.fade_gain[term] * whole;
             memory[at] = kept;
@@ -93,7 +95,7 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
         swollen = (volume_change[node_group.x] + volume_change[node_group.y] + volume_change[node_group.z] + volume_change[node_group.w]) * 0.25;
     }
     swollen -= resistance(d).x;
-    let at_rest = (3.0 + sqrt(3.0)) * abs(stress_at_rest(constants)) + m.y + 5.0 / 3.0 * m.x;
+    let at_rest = (3.0 + sqrt(3.0)) * abs(stress_at_rest(constants)) + stiffening_at_rest(constants) + m.y + 5.0 / 3.0 * m.x;
     let growth = max(d.c.w * (stiffness(found, m, d, swollen) - at_rest), 1e-30);
     if RELAXES { found = relaxed(e, found, d); }
     found.q += m.y * swollen;

@@ -4,6 +4,7 @@ const ROUND = false;
 fn more_of(e: u32) -> vec4f { return more[e]; }
 fn moduli(c: array<f32, 5>) -> vec2f { return vec2f(2.0 * (c[0] + c[1]), c[2]); }
 fn stress_at_rest(c: array<f32, 5>) -> f32 { return 2.0 * (c[0] + 2.0 * c[1]); }
+fn stiffening_at_rest(c: array<f32, 5>) -> f32 { return 0.0; }
 fn stress(c: array<f32, 5>, d: Deformation) -> Stress {
     let power = d.root * d.root;
     let g = continued(d, power, -2.0 / 3.0);
@@ -15,5 +16,5 @@ fn stress(c: array<f32, 5>, d: Deformation) -> Stress {
     let along = 2.0 * c[0] * g.x + second * i1;
     let s = array<f32, 6>(
         along - second * b[0], along - second * b[1], along - second * b[2], -second * b[3], -second * b[4], -second * b[5]);
-    return Stress(s, c[0] * g.y * i1 + c[1] * h.y * i2);
+    return Stress(s, c[0] * g.y * i1 + c[1] * h.y * i2, 0.0);
 }

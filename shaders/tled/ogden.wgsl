@@ -61,6 +61,7 @@ fn term(scale: f32, alpha: f32, squares: vec3f, d: Deformation) -> vec4f {
     return vec4f(2.0 * scale * g.x * vec3f(x.y, y.y, z.y), scale * g.y * (x.x + y.x + z.x));
 }
 
+fn stiffening_at_rest(c: array<f32, 5>) -> f32 { return 0.0; }
 fn stress(c: array<f32, 5>, d: Deformation) -> Stress {
     var b = squared_rows(d.f);
     var x = vec3f(1.0, 0.0, 0.0);
@@ -87,5 +88,5 @@ fn stress(c: array<f32, 5>, d: Deformation) -> Stress {
     let both = term(c[0], c[1], squares, d) + term(c[2], c[3], squares, d);
     let plain = both.x * x * x + both.y * y * y + both.z * z * z;
     let mixed = both.x * x * x.yzx + both.y * y * y.yzx + both.z * z * z.yzx;
-    return Stress(array<f32, 6>(plain.x, plain.y, plain.z, mixed.x, mixed.z, mixed.y), both.w);
+    return Stress(array<f32, 6>(plain.x, plain.y, plain.z, mixed.x, mixed.z, mixed.y), both.w, 0.0);
 }

@@ -13,8 +13,7 @@ struct Spring {
     damping: f32,
     rest_depth: f32,
     tool_velocity: f32,
-    // Σ w²/m.
-    compliance: f32,
+    unused: f32,
     // To what sliding is damped, mm/ms, and how strongly, N ms/mm.
     lateral_velocity: vec3f,
     lateral_damping: f32,
@@ -34,12 +33,13 @@ struct Spring {
 @group(0) @binding(7) var<storage, read_write> pushed: array<vec4f>;
 // Of all springs, summed, N.
 @group(0) @binding(8) var<storage, read_write> pressure: array<f32>;
+@group(0) @binding(9) var<storage, read> anchors: array<Anchor>;
 
-var<workgroup> sums: array<vec2f, 64>;
+var<workgroup> sums: array<vec3f, 64>;
 
 // Force of a spring that is so deep, mm, on nodes that come at this speed, mm/ms.
-fn pressed(spring: Spring, depth: f32, coming: f32, touches: bool) -> f32 {
-    let held = 1.0 + now.gain * (spring.stiffness * now.dt + spring.damping) * spring.compliance;
+fn pressed(spring: Spring, depth: f32, coming: f32, compliance: f32, touches: bool) -> f32 {
+    let held = 1.0 + now.gain * (spring.stiffness * now.dt + spring.damping) * compliance;
     let force = (spring.stiffness * (depth + now.dt * coming) + spring.damping * (coming - spring.tool_velocity)) / held;
     let finite = (bitcast<u32>(force) & 0x7f800000u) != 0x7f800000u;
     return select(0.0, max(force, 0.0), touches && finite);
@@ -52,7 +52,17 @@ fn free_velocity(at: vec4u) -> vec3f {
     if inverse_mass == 0.0 { return v[at.x].xyz; }
     var force = pushed[at.x].xyz;
     for (var slot = starts[at.x]; slot < starts[at.x + 1u]; slot++) { force += forces[slot].xyz; }
-    return v[at.x].xyz * now.keep + (now.gravity * bitcast<f32>(at.w) + force * inverse_mass) * now.gain;
+    let moved = u[at.x].xyz;
+    let pull = weight_at(at.x, moved) * bitcast<f32>(at.w) + force * inverse_mass;
+    return anchored(at.x, moved, v[at.x].xyz * now.keep + pull * now.gain, inverse_mass * now.gain);
+}
+
+// 1/m of a node, less where an anchor holds it.
+fn moved_by_force(at: vec4u) -> f32 {
+    let inverse_mass = bitcast<f32>(at.z);
+    let anchor = anchors[at.x];
+    let held = anchor.along * (1.0 - anchor.in_fluid * dryness(anchor.rest + u[at.x].xyz));
+    return inverse_mass / (1.0 + held * inverse_mass * now.gain * now.dt);
 }
 
 @compute @workgroup_size(64) fn main(@builtin(local_invocation_index) lane: u32) {
@@ -72,10 +82,11 @@ fn free_velocity(at: vec4u) -> vec3f {
         let mine = lane < spring.count;
         let inverse_mass = bitcast<f32>(at.z);
         var velocity = vec3f(0.0);
-        sums[lane] = vec2f(0.0);
+        sums[lane] = vec3f(0.0);
         if mine {
             velocity = free_velocity(at);
-            sums[lane] = weight * vec2f(dot(u[at.x].xyz, spring.normal), dot(velocity, spring.normal));
+            let along = vec2f(dot(u[at.x].xyz, spring.normal), dot(velocity, spring.normal));
+            sums[lane] = weight * vec3f(along, weight * moved_by_force(at));
         }
         workgroupBarrier();
         // A tree of fixed shape: the same sum in every run.
@@ -84,7 +95,7 @@ fn free_velocity(at: vec4u) -> vec3f {
             workgroupBarrier();
         }
         let depth = spring.rest_depth + sums[0].x;
-        let force = pressed(spring, depth, sums[0].y, depth > 0.0);
+        let force = pressed(spring, depth, sums[0].y, sums[0].z, depth > 0.0);
         total += force;
         if mine && depth > 0.0 {
             let slip = velocity - spring.lateral_velocity;
@@ -107,13 +118,13 @@ fn free_velocity(at: vec4u) -> vec3f {
         let ahead = depth + now.dt * coming;
         var reached = plane;
         if depth <= 0.0 { reached.damping *= ahead / (now.dt * coming); }
-        let force = pressed(reached, depth, coming, depth > 0.0 || ahead > 0.0);
+        let force = pressed(reached, depth, coming, moved_by_force(at), depth > 0.0 || ahead > 0.0);
         of_planes += force;
         let braking = plane.damping * clamp(depth / SLIDING_FULL_MM, 0.0, 1.0);
         let brake = braking / (1.0 + now.gain * bitcast<f32>(at.z) * braking);
         pushed[at.x] -= vec4f(plane.normal * force + (velocity - plane.normal * coming) * brake, 0.0);
     }
-    sums[lane] = vec2f(of_planes, 0.0);
+    sums[lane] = vec3f(of_planes, 0.0, 0.0);
     workgroupBarrier();
     for (var reach = 32u; reach > 0u; reach >>= 1u) {
         if lane < reach { sums[lane] += sums[lane + reach]; }

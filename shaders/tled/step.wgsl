@@ -12,10 +12,16 @@ struct Step {
     elements: u32,
     nodes: u32,
     node_groups: u32,
-    // What the two terms of past stress keep and take up.
-    fade_keep: vec2f,
-    fade_gain: vec2f,
+    // What the three terms of past stress keep and take up; the fourth number is unused.
+    fade_keep: vec4f,
+    fade_gain: vec4f,
     // Planes, behind the springs in their list.
     planes: u32,
+    // Fluid around the body: pressure in an opening, MPa; unit vector against gravity, height of
+    // the level along it, acceleration of what lies above.
+    opening: f32,
+    up: vec3f,
+    level: f32,
+    weight: vec3f,
 }
 @group(0) @binding(0) var<uniform> now: Step;

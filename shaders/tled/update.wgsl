@@ -10,6 +10,7 @@
 // Since they were last cleared: most inverted elements at once, times limited, times not finite,
 // bits of the largest growth of ω².
 @group(0) @binding(7) var<storage, read_write> noticed: array<vec4u>;
+@group(0) @binding(8) var<storage, read> anchors: array<Anchor>;
 
 fn finite(x: vec3f) -> bool {
     let exponents = bitcast<vec3u>(x) & vec3u(0x7f800000u);
@@ -35,7 +36,8 @@ fn finite(x: vec3f) -> bool {
     if node.x > 0.0 {
         if node.z != 0.0 { force += pushed[n].xyz; }
         let before = u[n].xyz;
-        var velocity = v[n].xyz * now.keep + (now.gravity * node.y + force * node.x) * now.gain;
+        let pull = weight_at(n, before) * node.y + force * node.x;
+        var velocity = anchored(n, before, v[n].xyz * now.keep + pull * now.gain, node.x * now.gain);
         let speed = length(velocity);
         var held = speed > now.max_speed;
         if held { velocity *= now.max_speed / speed; }

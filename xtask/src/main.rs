@@ -1,5 +1,6 @@
 //! The project's own commands: `cargo xtask test | validate | merge | compare | layers | tidy`.
 
+mod constants;
 mod layers;
 mod merge;
 mod modules;
@@ -55,7 +56,8 @@ enum Task {
     /// Check that every arrow between crates points down and that each crate does only what is its
     /// to do
     Layers,
-    /// Check module docs, file lengths, READMEs, examples, shader and Rust pairs
+    /// Check module docs, file lengths, READMEs, examples, shader and Rust pairs, and that physical
+    /// constants name a row of the register of measurements
     Tidy,
 }
 
@@ -84,8 +86,15 @@ fn run() -> Result<()> {
             validate(&["compare".into(), old.display().to_string(), new.display().to_string()])
         }
         Task::Layers => report("layers", layers::check(&root())?),
-        Task::Tidy => report("tidy", tidy::check(&root())?),
+        Task::Tidy => report("tidy", tidy(&root())?),
     }
+}
+
+/// Faults of prose and lengths, and physical constants without a row.
+fn tidy(root: &Path) -> Result<Vec<String>> {
+    let mut faults = tidy::check(root)?;
+    faults.extend(constants::check(root)?);
+    Ok(faults)
 }
 
 /// Starts the program of all suites, in release mode. Not quietly: cargo reports that it builds or
@@ -100,7 +109,7 @@ fn validate(arguments: &[String]) -> Result<()> {
 fn test() -> Result<()> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     report("layers", layers::check(&root())?)?;
-    report("tidy", tidy::check(&root())?)?;
+    report("tidy", tidy(&root())?)?;
     cargo(
         &["clippy", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet", "--", "--deny", "warnings"],
         &[],

@@ -6,8 +6,8 @@ use crate::step::{edge_mm, stable_dt_ms};
 use crate::{Bone, Machine, Picture, PlanError, Quality, Row, Rows, Scene, Setup, Tissue, TissueForce};
 use core::f64::consts::PI;
 
-/// Fraction of a tick available to the rigid contact; the rest is for device, force model and
-/// guard.
+/// A numerical parameter: fraction of a tick available to the rigid contact; the rest is for
+/// device, force model and guard.
 const TICK_SHARE: f64 = 0.25;
 /// Speed-up from each solver thread after the first.
 const THREAD_GAIN: f64 = 0.8;

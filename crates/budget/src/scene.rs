@@ -56,6 +56,7 @@ impl Default for Scene {
     ///
     /// Force error: 0.1 N on bone; a tenth on tissue, but not under 0.02 N. Displacement: what the
     /// usual setup just meets in an adult head. Picture: its edges are still sharp.
+    /// All are numerical tolerances, not constants of nature.
     fn default() -> Self {
         Self {
             force_error_n: 0.1,
@@ -73,7 +74,7 @@ impl Default for Scene {
             probe_radius_mm: 2.0,
             brain_mm3: 1.2e6,
             material: Material::BRAIN,
-            device_rate_hz: 1000.0,
+            device_rate_hz: 1000.0, // numerical
             headroom: 1.5,
             picture_pixels: [960, 720],
             view_mm: 200.0,

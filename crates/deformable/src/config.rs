@@ -34,6 +34,7 @@ impl Default for Config {
             response: None,
             points: trepan_geometry::Pointshell::DEFORMABLE_COUNT,
             cell_mm: None,
+            // Numerical: the coupling between hand and tissue, not the tissue.
             stiffness: 0.3,
             damping: 0.3,
             friction: 0.0,

@@ -43,7 +43,7 @@ pub use outcome::TissueStep;
 pub use phase::{BroadPhase, Indexed, Phased};
 pub use seam::{Search, SearchInputs};
 pub use step::TissueCollision;
-pub use wall::{Hollow, SlidingWall};
+pub use wall::{BorderNode, Hollow, SlidingWall};
 
 #[doc = include_str!("../README.md")]
 #[cfg(doctest)]

@@ -67,12 +67,13 @@ pub struct SlidingWall {
 
 /// A node that may meet the wall.
 #[derive(Clone, Copy, Debug)]
-struct BorderNode {
-    node: u32,
+pub struct BorderNode {
+    /// The node.
+    pub node: u32,
     /// Its share of the border at rest, mm².
-    area_mm2: f32,
+    pub area_mm2: f32,
     /// Unit normal of the border at rest, out of the tissue.
-    normal: Vec3,
+    pub normal: Vec3,
     /// The plane of a node that rests in the wall or at it, along that normal: depth is `x·n` plus
     /// this, mm.
     fixed_mm: Option<f32>,
@@ -104,6 +105,11 @@ impl SlidingWall {
             fixed_mm: None,
         });
         Ok(Self { border: border.collect(), stiffness_per_mm2: 0.05, damping_per_mm2: 0.1, ahead_mm: 0.5 })
+    }
+
+    /// The nodes that may meet the wall.
+    pub fn border(&self) -> &[BorderNode] {
+        &self.border
     }
 
     /// Takes these positions as the rest shape. Nodes in the wall, or nearer to it than planes are

@@ -5,7 +5,7 @@ use trepan_contact::{GuardConfig, GuardedWrench, PassivityConfig, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3};
 
 /// Damping of a light grip, N ms/mm.
-const LIGHT_GRIP: f32 = trepan_measurements::hands::LIGHT_GRIP_DAMPING.f32();
+const LIGHT_GRIP: f32 = trepan_measurements::grip::LIGHT_GRIP_DAMPING.f32();
 
 /// A haptic device, or something that behaves like one.
 pub trait HapticDevice: Send {
@@ -76,7 +76,7 @@ impl Capabilities {
         name: String::new(),
         peak_force_n: 0.0,
         continuous_force_n: 0.0,
-        rate_hz: 1000.0,
+        rate_hz: 1000.0, // numerical
         workspace_mm: Vec3::INFINITY,
         axes_driven: 0,
         position_resolution_mm: 0.0,

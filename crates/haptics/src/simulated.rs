@@ -31,7 +31,7 @@ use crate::scripted::operation_name;
 use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, Opened, Reading};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Vec3, Wrench};
-use trepan_measurements::hands;
+use trepan_measurements::{devices, grip};
 
 /// `simulated:NAME`: a Touch in a firm hand that follows a scripted operation.
 pub static DEVICE: Descriptor = Descriptor {
@@ -79,14 +79,14 @@ pub struct Config {
 impl Config {
     /// A Touch, on a link that supports 4 kHz.
     pub const TOUCH: Self = Self {
-        mass_g: 45.0,
-        damping: 0.1,
-        friction_n: 0.26,
+        mass_g: devices::TOUCH_MASS.f32(),
+        damping: devices::TOUCH_DAMPING.f32(),
+        friction_n: devices::TOUCH_FRICTION.f32(),
         quantum_mm: 0.055,
         delay_ticks: 1,
-        peak_force_n: 3.3,
+        peak_force_n: devices::TOUCH_PEAK_FORCE.f32(),
         velocity_filter_ms: 5.0,
-        rate_hz: 4000.0,
+        rate_hz: 4000.0, // numerical
     };
 }
 
@@ -112,17 +112,20 @@ impl HandModel {
     pub const FREE: Self = Self { mass_g: 0.0, damping: 0.0, stiffness: 0.0 };
     /// A light grip.
     pub const LIGHT: Self = Self {
-        mass_g: hands::LIGHT_GRIP_MASS.f32(),
-        damping: hands::LIGHT_GRIP_DAMPING.f32(),
-        stiffness: hands::LIGHT_GRIP_STIFFNESS.f32(),
+        mass_g: grip::LIGHT_GRIP_MASS.f32(),
+        damping: grip::LIGHT_GRIP_DAMPING.f32(),
+        stiffness: grip::LIGHT_GRIP_STIFFNESS.f32(),
     };
     /// A firm grip.
     pub const FIRM: Self = Self {
-        mass_g: hands::FIRM_GRIP_MASS.f32(),
-        damping: hands::FIRM_GRIP_DAMPING.f32(),
-        stiffness: hands::FIRM_GRIP_STIFFNESS.f32(),
+        mass_g: grip::FIRM_GRIP_MASS.f32(),
+        damping: grip::FIRM_GRIP_DAMPING.f32(),
+        stiffness: grip::FIRM_GRIP_STIFFNESS.f32(),
     };
 }
+
+/// Force that a simulated device holds, as a share of its largest: that of a Touch.
+const CONTINUOUS_SHARE: f32 = devices::TOUCH_CONTINUOUS_FORCE.f32() / devices::TOUCH_PEAK_FORCE.f32();
 
 /// A simulated device whose hand follows the pose of another device.
 pub struct Simulated {
@@ -241,7 +244,7 @@ impl HapticDevice for Simulated {
         Capabilities {
             name: format!("simulated, {:.0} g, delay of {} ticks", self.config.mass_g, self.config.delay_ticks),
             peak_force_n: self.config.peak_force_n,
-            continuous_force_n: 0.27 * self.config.peak_force_n,
+            continuous_force_n: CONTINUOUS_SHARE * self.config.peak_force_n,
             rate_hz: self.config.rate_hz,
             workspace_mm: Vec3::new(160.0, 120.0, 70.0),
             axes_driven: 3,

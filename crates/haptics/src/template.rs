@@ -196,7 +196,7 @@ impl HapticDevice for Template {
     fn capabilities(&self) -> Capabilities {
         Capabilities {
             name: "template".to_owned(),
-            peak_force_n: 3.0,
+            peak_force_n: 3.0, // numerical: an example
             continuous_force_n: 1.0,
             workspace_mm: Vec3::splat(100.0),
             axes_driven: 3,

@@ -10,9 +10,11 @@ use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume};
 use wide::{f32x8, i16x8};
 
-/// Fall of the ramp down to which the per-tick law cuts at the burr's surface, HU per voxel.
+/// A numerical parameter: fall of the ramp down to which the per-tick law cuts at the burr's
+/// surface, HU per voxel.
 const RAMP_HU: f32 = 1000.0;
-/// Span of density around the isovalue in which a voxel counts as partly bone, HU.
+/// A numerical parameter: span of density around the isovalue in which a voxel counts as partly
+/// bone, HU.
 const PARTIAL_HU: f32 = 750.0;
 /// How far in front of the proxy the per-tick law bites, voxels.
 const BITE_VOXELS: f32 = 1.5;

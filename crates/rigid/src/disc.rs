@@ -37,7 +37,8 @@ use nalgebra::{SMatrix, SVector};
 use trepan_geometry::Vec3;
 use wide::f32x8;
 
-/// Density differences past this many HU from the isovalue do not bend a normal further.
+/// A numerical parameter: density differences past this many HU from the isovalue do not bend a
+/// normal further.
 const CLAMP_HU: f32 = 1000.0;
 /// How far the rim of a disc may stand out over a surface that bends away, voxels.
 pub(crate) const STAND_OUT: f32 = 0.05;
@@ -45,7 +46,8 @@ pub(crate) const STAND_OUT: f32 = 0.05;
 const SAME: f32 = 0.8;
 /// Radius of a disc on the cut, cells.
 pub(crate) const CUT_DISC: f32 = 0.5;
-/// Density over the isovalue at which the surface is further than a disc reaches, HU.
+/// A numerical parameter: density over the isovalue at which the surface is further than a disc
+/// reaches, HU.
 const FAR_HU: f32 = 800.0;
 /// Weight of flatness in the fit of a quadric, beside weights of the densities of about 1.
 const RIDGE: f32 = 1e-4;

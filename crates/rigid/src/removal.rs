@@ -56,7 +56,7 @@
 
 use crate::spindle::{Spindle, per_ms};
 use trepan_geometry::{Tool, ToolKind};
-use trepan_measurements::{drilling, hands, skull};
+use trepan_measurements::{devices, drilling, hands, skull};
 use trepan_volume::AIR_HU;
 
 /// Density at which the specific energy is given, HU: dense cortical bone.
@@ -70,7 +70,7 @@ const UM: f32 = 1e-3;
 
 /// Newtons at the hand per newton of the task, of a hand that no device limits: the greatest
 /// published force on a drill becomes the Touch's peak.
-pub const FORCE_SCALE: f32 = hands::DEVICE_PEAK_FORCE.f32() / hands::DRILLING_PEAK_GREATEST.f32();
+pub const FORCE_SCALE: f32 = devices::TOUCH_PEAK_FORCE.f32() / hands::DRILLING_PEAK_GREATEST.f32();
 
 /// A cutter and its motor.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,18 +1,21 @@
 //! Settings of an operation: flap, loss of cerebrospinal fluid, forbidden tissue, brain stiffness,
 //! tick rate. They come from the options, else from the replayed recording, else from defaults.
 
-use crate::options::{MODULI_KPA, Options, RATES_HZ};
+use crate::options::{CSF_SPEED_UPS, MODULI_KPA, Options, RATES_HZ};
 use crate::tissue_class::TissueClass;
 use trepan_haptics::DeviceName;
 use trepan_link::Recording;
+use trepan_measurements::support;
 
 /// Default diameter of the flap that script `flap` cuts, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
 /// Default share of the fluid's buoyancy that is lost when the dura is opened.
-const CSF_LOSS: f32 = 0.05;
+const CSF_LOSS: f32 = support::CSF_LOSS.f32();
+/// Default factor by which the fluid drains faster than in a patient.
+const CSF_SPEED_UP: f32 = support::DRAIN_SPEED_UP.f32();
 /// Default Young's modulus of the brain, kPa.
 const YOUNG_KPA: f32 = 3.0;
-/// Default haptic tick rate, Hz.
+/// Default haptic tick rate, Hz, numerical.
 const RATE_HZ: f32 = 1000.0;
 
 /// Settings of an operation.
@@ -22,6 +25,8 @@ pub(crate) struct Operation {
     pub flap_mm: f32,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1.
     pub csf_loss: f32,
+    /// Factor by which the fluid drains faster than in a patient, 1 to 1000.
+    pub csf_speed_up: f32,
     /// Tissue classes that raise a warning when a tool comes close.
     pub forbidden: Vec<TissueClass>,
     /// Young's modulus of the brain, kPa.
@@ -53,6 +58,10 @@ impl Operation {
                 .csf_loss
                 .or_else(|| number("csf_loss").or_else(|| number("fluid_lost")))
                 .unwrap_or(CSF_LOSS),
+            csf_speed_up: options
+                .csf_speed_up
+                .or_else(|| within("csf_speed_up", CSF_SPEED_UPS))
+                .unwrap_or(CSF_SPEED_UP),
             forbidden: options.forbid.clone().or_else(listed).unwrap_or_else(|| vec![TissueClass::Vessel]),
             young_kpa: options
                 .young_modulus_kpa
@@ -68,11 +77,12 @@ impl Operation {
     }
 
     /// Entries for a recording's header.
-    pub fn entries(&self) -> [(String, String); 7] {
+    pub fn entries(&self) -> [(String, String); 8] {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
             ("flap_mm".into(), self.flap_mm.to_string()),
             ("csf_loss".into(), self.csf_loss.to_string()),
+            ("csf_speed_up".into(), self.csf_speed_up.to_string()),
             ("forbidden".into(), forbidden.join(",")),
             ("young_modulus_kpa".into(), self.young_kpa.to_string()),
             ("rate_hz".into(), self.rate_hz.to_string()),
@@ -94,7 +104,7 @@ mod tests {
         let usual = Operation::of(&parse("x"), &DeviceName::MOUSE, None);
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, CSF_LOSS, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
-        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --young-modulus-kpa 6 --rate-hz 500 --watch other";
+        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --rate-hz 500 --watch other";
         let given = Operation::of(&parse(line), &script, None);
         assert!(!given.opening_needed && usual.opening_needed);
         let mut recording = Recording::default();

@@ -368,7 +368,7 @@ impl Session {
                 name: self.setup.solver_name().into(),
                 tets: brain.map_or(0, |brain| brain.mesh.tets.len()),
                 nodes: brain.map_or(0, |brain| brain.mesh.positions.len()),
-                fixed_nodes: brain.map_or(0, |brain| brain.fixed.len()),
+                fixed_nodes: self.setup.fixed_nodes(),
                 ..SolverSummary::default()
             }),
             asked_hz: self.setup.operation.rate_hz.into(),

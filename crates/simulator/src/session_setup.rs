@@ -1,11 +1,12 @@
 //! Setup of a session: patient, plan and models, and the stages built from them.
 
 use crate::case::Case;
+use crate::case::anchors::Held;
 use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, Scene};
 use crate::error::SessionError;
 use crate::hand::DeviceLimits;
-use crate::ingredients::Ingredients;
+use crate::ingredients::{Ingredients, Support};
 use crate::models::Models;
 use crate::operation::Operation;
 use crate::program::Program;
@@ -17,7 +18,6 @@ use crate::stages::haptic_config::{BONE, HapticConfig, TISSUE, bone_force};
 use crate::stages::haptic_tick::HapticStage;
 use crate::stages::second_hand::SecondHand;
 use crate::stages::settling::Settling;
-use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use crate::tissue_class::TissueClass;
 use std::sync::{Arc, OnceLock};
@@ -106,6 +106,11 @@ impl SessionSetup {
         Ingredients { device: self.ran.get().map_or(chosen.device, |ran| ran.device), ..chosen }
     }
 
+    /// Nodes of the brain that do not move.
+    pub fn fixed_nodes(&self) -> usize {
+        self.ran.get().map_or(0, |ran| ran.fixed_nodes)
+    }
+
     /// Remarks on the solver, for the report.
     pub fn solver_remarks(&self) -> Vec<String> {
         self.ran.get().map(Ran::remarks).unwrap_or_default()
@@ -152,20 +157,37 @@ impl SessionSetup {
         Ok(Method::named(method).ok_or_else(unknown)?.with_points(points))
     }
 
+    /// What holds the brain, and the loads on it once the dura is open.
+    fn held(&self, brain: &RestBrain, with: &Ingredients) -> Result<(Held, Settling), SessionError> {
+        let Operation { csf_loss, csf_speed_up, .. } = self.operation;
+        let is_rival = trepan_soft::Method::named(self.models.setup.tissue.solver).is_some();
+        let outward = -self.plan.site.inward;
+        match self.bone().filter(|_| with.support == Support::Anchored && !is_rival) {
+            Some(bone) => {
+                let settling = Settling::draining(&brain.mesh, outward, csf_loss, csf_speed_up);
+                brain.held_in_skull(Arc::clone(bone), &self.plan).map(|held| (held, settling))
+            }
+            None => {
+                let settling = Settling::new(csf_loss, Vec3::NEG_Y, outward);
+                brain.held_by_base(self.bone().cloned()).map(|held| (held, settling))
+            }
+        }
+        .map_err(|fault| brain_error(&fault))
+    }
+
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
+        let (Held { fixed, anchors, mut wall }, settling) = self.held(brain, with)?;
         let body = Body {
             mesh: brain.mesh.clone(),
-            fixed: brain.fixed.clone(),
+            fixed,
+            anchors,
             materials: TissueClass::ALL
                 .map(|class| with.laws[class as usize].like(class.material(self.young_mpa)))
                 .to_vec(),
             material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
-        let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
-        let mut wall = wall.transpose().map_err(|fault| brain_error(&fault))?;
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
         let _first = self.ran.set(ran);
-        let settling = Settling::new(self.operation.csf_loss, Vec3::NEG_Y, -self.plan.site.inward);
         let touch = touch(&brain.mesh, with)?;
         let collision = CollisionStage::new(self.program, &brain.mesh, &touch, wall)
             .and_then(|stage| if with.folds { stage.folding(&brain.mesh) } else { Ok(stage) })

@@ -1,6 +1,6 @@
 //! A body: tetrahedra, what they are made of, and which nodes do not move.
 
-use crate::{Material, MaterialError, Shape};
+use crate::{Anchor, Material, MaterialError, Shape};
 use trepan_geometry::Vec3;
 use trepan_mesh::TetMesh;
 
@@ -15,6 +15,8 @@ pub struct Body {
     pub materials: Vec<Material>,
     /// Which of `materials` each tetrahedron is of.
     pub material_of_tet: Vec<u8>,
+    /// Springs to places at rest, at most one a node; the last one of a node counts.
+    pub anchors: Vec<Anchor>,
 }
 
 /// Why a body was refused.
@@ -83,6 +85,19 @@ pub enum BodyError {
         /// Nodes in the mesh.
         nodes: usize,
     },
+    /// An anchor is on no node, or is not a spring.
+    #[error(
+        "anchors[{index}] is on node {node} of {nodes}: it needs a node of the mesh, finite numbers, none of them \
+         negative, and `in_fluid` up to 1"
+    )]
+    Anchor {
+        /// Which one.
+        index: usize,
+        /// The node that it names.
+        node: u32,
+        /// Nodes in the mesh.
+        nodes: usize,
+    },
     /// A static solver was given a body that can float away.
     #[error("fixed holds {0} nodes: a static solver needs at least 3 that are not on one line")]
     Floating(usize),
@@ -117,7 +132,8 @@ impl BodyError {
 impl Body {
     /// A body of one material.
     pub fn uniform(mesh: TetMesh, fixed: Vec<u32>, material: Material) -> Self {
-        Self { material_of_tet: vec![0; mesh.tets.len()], mesh, fixed, materials: vec![material] }
+        let material_of_tet = vec![0; mesh.tets.len()];
+        Self { material_of_tet, mesh, fixed, materials: vec![material], anchors: Vec::new() }
     }
 
     /// Material of a tetrahedron.
@@ -127,7 +143,7 @@ impl Body {
 
     /// The same body of one material throughout.
     pub fn with_material(self, material: Material) -> Self {
-        Self::uniform(self.mesh, self.fixed, material)
+        Self { anchors: self.anchors, ..Self::uniform(self.mesh, self.fixed, material) }
     }
 
     pub(crate) fn elements(&self) -> Vec<Element> {
@@ -161,6 +177,10 @@ impl Body {
         }
         if let Some(orphan) = used.iter().position(|u| !u) {
             return Err(BodyError::Orphan(orphan));
+        }
+        let is_wrong = |anchor: &&Anchor| anchor.node as usize >= nodes || !anchor.is_sound();
+        if let Some((index, anchor)) = self.anchors.iter().enumerate().find(|(_, anchor)| is_wrong(anchor)) {
+            return Err(BodyError::Anchor { index, node: anchor.node, nodes });
         }
         match self.fixed.iter().find(|&&n| n as usize >= nodes) {
             Some(&node) => Err(BodyError::FixedRange { node, nodes }),
@@ -260,6 +280,11 @@ mod tests {
         assert!(matches!(broken(|b| b.mesh.positions[4].y = f32::NAN), BodyError::Position(4)));
         assert!(matches!(broken(|b| b.mesh.positions.push(Vec3::ZERO)), BodyError::Orphan(27)));
         assert!(matches!(broken(|b| b.fixed.push(27)), BodyError::FixedRange { node: 27, .. }));
+        let anchor = Anchor { node: 27, ..Anchor::default() };
+        let fault = Body { anchors: vec![Anchor::default(), anchor], ..cube() }.check();
+        assert!(matches!(fault, Err(BodyError::Anchor { index: 1, node: 27, nodes: 27 })));
+        let fault = Body { anchors: vec![Anchor { along: -1.0, ..Anchor::default() }], ..cube() }.check();
+        assert!(matches!(fault, Err(BodyError::Anchor { index: 0, .. })));
         assert!(matches!(broken(|b| _ = b.material_of_tet.pop()), BodyError::MaterialCount { found: 47, tets: 48 }));
         assert!(matches!(broken(|b| b.material_of_tet[5] = 1), BodyError::MaterialRange { tet: 5, index: 1, .. }));
         assert!(matches!(broken(|b| b.materials.clear()), BodyError::MaterialRange { tet: 0, materials: 0, .. }));

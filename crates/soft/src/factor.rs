@@ -82,6 +82,22 @@ impl Factor {
         }
     }
 
+    /// `xᵀ A x` of what was added, without fixed nodes.
+    #[cfg(test)]
+    pub fn work(&self, x: &[DVec3]) -> f64 {
+        let mut all = vec![0.0; self.size()];
+        for (x, &first) in x.iter().zip(&self.first_of_node).filter(|(_, first)| **first != FIXED) {
+            all[first..first + 3].copy_from_slice(&x.to_array());
+        }
+        let column = |c: usize| {
+            let entries = self.starts[c]..self.starts[c + 1];
+            entries
+                .map(|at| self.values[at] * all[c] * all[self.rows[at]] * if self.rows[at] == c { 1.0 } else { 2.0 })
+                .sum::<f64>()
+        };
+        (0..self.size()).map(column).sum()
+    }
+
     /// Factors what was added; false when it is not positive definite.
     pub fn factor(&mut self) -> bool {
         let size = self.size();

@@ -7,12 +7,14 @@
 //! St. Venant-Kirchhoff    W = λ/2 (tr E)² + μ E:E                           E = (FᵀF - I)/2
 //! Mooney-Rivlin           W = c₁₀ (J^(-2/3) I₁ - 3) + c₀₁ (J^(-4/3) I₂ - 3) + κ U(J)
 //! Ogden                   W = Σ_p 2 μ_p/α_p² (Σ_i (J^(-1/3) λ_i)^α_p - 3) + κ U(J)
+//! stiffening              see `stiffening.rs`
 //! ```
 //! λ_i² are the eigenvalues of FᵀF, U is `(J-1)²/2` with a wall below 0.3 (see `energy.rs`). Powers
 //! of J continue linearly below 0.3 ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so
 //! that every energy is finite for every F.
 
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power, squared, volumetric};
+use crate::stiffening::Stiffening;
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix3;
 
@@ -49,6 +51,8 @@ pub enum Law {
         /// Bulk modulus κ.
         kappa: f64,
     },
+    /// Stiffening with strain, more in compression.
+    Stiffening(Stiffening),
 }
 
 impl Law {
@@ -57,6 +61,7 @@ impl Law {
         let j = f.determinant();
         match *self {
             Self::NeoHookean(law) => law.energy(f),
+            Self::Stiffening(law) => law.energy(f),
             Self::StVenantKirchhoff { lambda, mu } => {
                 let e = green(f);
                 0.5 * lambda * trace(e).powi(2) + mu * squared(e)
@@ -82,6 +87,7 @@ impl Law {
         let (j, c) = (f.determinant(), cofactor(f));
         match *self {
             Self::NeoHookean(law) => law.stress(f),
+            Self::Stiffening(law) => law.stress(f),
             Self::StVenantKirchhoff { lambda, mu } => {
                 let e = green(f);
                 f * (DMat3::from_diagonal(DVec3::splat(lambda * trace(e))) + e * (2.0 * mu))
@@ -100,6 +106,7 @@ impl Law {
     pub fn stress_change(&self, f: DMat3, df: DMat3) -> DMat3 {
         match *self {
             Self::NeoHookean(law) => law.stress_change(f, df),
+            Self::Stiffening(law) => law.stress_change(f, df),
             Self::StVenantKirchhoff { lambda, mu } => {
                 let (e, de) = (green(f), symmetric(f.transpose() * df));
                 let second = |e: DMat3| DMat3::from_diagonal(DVec3::splat(lambda * trace(e))) + e * (2.0 * mu);
@@ -120,6 +127,18 @@ impl Law {
             Self::StVenantKirchhoff { lambda, mu } => (mu, lambda + mu * 2.0 / 3.0),
             Self::MooneyRivlin { c10, c01, kappa } => (2.0 * (c10 + c01), kappa),
             Self::Ogden { mu, kappa, .. } => (mu[0] + mu[1], kappa),
+            Self::Stiffening(law) => (law.mu, law.kappa),
+        }
+    }
+
+    /// The same law with another bulk modulus at small strain, MPa.
+    pub fn with_bulk(self, bulk_mpa: f64) -> Self {
+        match self {
+            Self::NeoHookean(law) => Self::NeoHookean(NeoHookean { kappa: bulk_mpa, ..law }),
+            Self::StVenantKirchhoff { mu, .. } => Self::StVenantKirchhoff { lambda: bulk_mpa - mu * 2.0 / 3.0, mu },
+            Self::MooneyRivlin { c10, c01, .. } => Self::MooneyRivlin { c10, c01, kappa: bulk_mpa },
+            Self::Ogden { mu, alpha, .. } => Self::Ogden { mu, alpha, kappa: bulk_mpa },
+            Self::Stiffening(law) => Self::Stiffening(Stiffening { kappa: bulk_mpa, ..law }),
         }
     }
 
@@ -210,12 +229,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn laws() -> [Law; 4] {
+    fn laws() -> [Law; 5] {
         [
             Law::NeoHookean(NeoHookean { mu: 0.7, kappa: 3.0 }),
             Law::StVenantKirchhoff { lambda: 2.0, mu: 0.7 },
             Law::MooneyRivlin { c10: 0.2, c01: 0.15, kappa: 3.0 },
             Law::Ogden { mu: [0.5, 0.2], alpha: [-4.7, 2.0], kappa: 3.0 },
+            Law::Stiffening(Stiffening { mu: 0.7, share: 0.4, bound: 0.02, kappa: 3.0 }),
         ]
     }
 
@@ -286,6 +306,12 @@ mod tests {
                     (powers - one * (powers.element_sum() / 3.0)) * (2.0 * mu[p] / alpha[p])
                 };
                 term(0) + term(1) + bulk(kappa)
+            }
+            Law::Stiffening(Stiffening { mu, share, bound, kappa }) => {
+                let powers = (stretch / j.cbrt()).powf(-34.0);
+                let slope = (1.0 + bound * (powers.element_sum() - 3.0)).powf(-15.0 / 16.0);
+                let own = (powers - one * (powers.element_sum() / 3.0)) * ((share - 1.0) * mu / 17.0 * slope);
+                own + (squares - one * (i1 / 3.0)) * (share * mu * j.powf(-2.0 / 3.0)) + bulk(kappa)
             }
         }
     }

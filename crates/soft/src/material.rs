@@ -24,7 +24,7 @@
 //! St. Venant-Kirchhoff gives way under compression beyond a stretch of about 0.6 and does not heal
 //! when turned inside out: it is here to be compared with.
 
-use crate::{Law, NeoHookean};
+use crate::{Law, NeoHookean, Stiffening};
 
 /// A hyperelastic material. A closed list: every solver matches on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +70,19 @@ pub enum Material {
         /// Density of the rest state, g/mm³.
         density_g_mm3: f32,
     },
+    /// Stiffening with strain, more in compression than in tension.
+    Stiffening {
+        /// Shear modulus μ at small strain, MPa.
+        shear_mpa: f32,
+        /// Share of it that is neo-Hookean, 0 to 1.
+        share: f32,
+        /// Bound of the stiffening, over 0 and at most 0.3; the smaller, the stiffer it gets.
+        bound: f32,
+        /// Poisson's ratio ν at small strain, 0 ≤ ν < 0.5.
+        poisson: f32,
+        /// Density of the rest state, g/mm³.
+        density_g_mm3: f32,
+    },
 }
 
 /// Why a material was refused.
@@ -92,6 +105,12 @@ pub enum MaterialError {
     /// Density is not a positive number.
     #[error("density_g_mm3 is {0}: it must be positive and finite (water is 0.001 g/mm³)")]
     Density(f32),
+    /// The neo-Hookean share of the stiffening law is outside its range.
+    #[error("share is {0}: it must be 0 to 1 (cortex is 0.5)")]
+    Share(f32),
+    /// The bound of the stiffening law is outside its range.
+    #[error("bound is {0}: it must be over 0 and at most 0.3 (cortex is 0.02)")]
+    Bound(f32),
     /// A fit that pushes back less when it is stretched more.
     #[error(
         "these constants make a material that gets softer until it collapses between stretch 0.5 and 2: \
@@ -153,7 +172,13 @@ impl Material {
                     return Err(MaterialError::Exponent(exponent[p]));
                 }
             }
-            Self::MooneyRivlin { .. } => {}
+            Self::Stiffening { share, .. } if !(0.0..=1.0).contains(&share) => {
+                return Err(MaterialError::Share(share));
+            }
+            Self::Stiffening { bound, .. } if !(bound > 0.0 && bound <= 0.3) => {
+                return Err(MaterialError::Bound(bound));
+            }
+            Self::MooneyRivlin { .. } | Self::Stiffening { .. } => {}
         }
         let shear = self.shear_mpa() as f32;
         if !positive(shear) {
@@ -177,7 +202,8 @@ impl Material {
             Self::NeoHookean { poisson, density_g_mm3, .. }
             | Self::StVenantKirchhoff { poisson, density_g_mm3, .. }
             | Self::MooneyRivlin { poisson, density_g_mm3, .. }
-            | Self::Ogden { poisson, density_g_mm3, .. } => [poisson, density_g_mm3],
+            | Self::Ogden { poisson, density_g_mm3, .. }
+            | Self::Stiffening { poisson, density_g_mm3, .. } => [poisson, density_g_mm3],
         }
     }
 
@@ -189,6 +215,7 @@ impl Material {
             }
             Self::MooneyRivlin { c10_mpa, c01_mpa, .. } => 2.0 * (f64::from(c10_mpa) + f64::from(c01_mpa)),
             Self::Ogden { shear_mpa, .. } => f64::from(shear_mpa[0]) + f64::from(shear_mpa[1]),
+            Self::Stiffening { shear_mpa, .. } => shear_mpa.into(),
         }
     }
 
@@ -214,6 +241,9 @@ impl Material {
             }
             Self::Ogden { shear_mpa, exponent, .. } => {
                 Law::Ogden { mu: shear_mpa.map(f64::from), alpha: exponent.map(f64::from), kappa }
+            }
+            Self::Stiffening { share, bound, .. } => {
+                Law::Stiffening(Stiffening { mu, share: share.into(), bound: bound.into(), kappa })
             }
         }
     }

@@ -8,7 +8,7 @@
 //! tetrahedron.
 
 use crate::body::Element;
-use crate::{Body, Material};
+use crate::{Anchor, Body, Material};
 use glam::{DMat3, DVec3};
 
 /// `K x` at the rest state; rows and columns of fixed nodes are taken out.
@@ -17,6 +17,7 @@ pub struct Stiffness {
     fixed: Vec<bool>,
     masses: Vec<f64>,
     hooke: Vec<Hooke>,
+    anchors: Vec<Anchor>,
 }
 
 /// Small-strain elasticity.
@@ -44,7 +45,8 @@ impl Stiffness {
     /// The operator of a body that passed its check.
     pub fn of(body: &Body) -> Self {
         let hooke = body.materials.iter().map(Hooke::of).collect();
-        Self { elements: body.elements(), fixed: body.fixed_mask(), masses: body.lumped_masses_g(), hooke }
+        let (elements, fixed, anchors) = (body.elements(), body.fixed_mask(), body.anchors.clone());
+        Self { elements, fixed, masses: body.lumped_masses_g(), hooke, anchors }
     }
 
     /// The same stiffness with other masses at the nodes, g.
@@ -71,6 +73,9 @@ impl Stiffness {
                 diagonal[n as usize] += shape.volume_mm3 * g.length_squared() * (lambda + 4.0 * mu);
             }
         }
+        for anchor in &self.anchors {
+            diagonal[anchor.node as usize] += f64::from(anchor.along + 2.0 * anchor.across);
+        }
         diagonal
     }
 
@@ -85,6 +90,11 @@ impl Stiffness {
             y[b] += forces[1];
             y[c] += forces[2];
             y[d] += forces[3];
+        }
+        for &Anchor { node, normal, along, across, .. } in &self.anchors {
+            let (u, n) = (x[node as usize], normal.as_dvec3());
+            let (out, across) = (n * u.dot(n), f64::from(across));
+            y[node as usize] += (u - out) * across + out * f64::from(along);
         }
         y.iter_mut().zip(&self.fixed).filter(|(_, fixed)| **fixed).for_each(|(y, _)| *y = DVec3::ZERO);
     }

@@ -1,5 +1,6 @@
 //! The seam of the soft-tissue solvers: loads in, nodal state out.
 
+use crate::Fluid;
 use glam::DVec3;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
@@ -68,6 +69,8 @@ pub struct Loads {
     pub gravity: Vec3,
     /// Springs on the tissue (tool, walls, folds), evaluated with the solver's own positions.
     pub contacts: NodalContacts,
+    /// Fluid around the body, with its level; TLED takes it, the rivals of this crate do not.
+    pub fluid: Fluid,
 }
 
 /// What happened in one step; every count is of this step alone.

@@ -47,7 +47,7 @@ fn a_solver_of_one_file_is_built_and_steps() {
     let toy = Method::of(&TOY);
     assert!(toy.name() == "toy" && !Method::all().contains(&toy));
     let mut solver = toy.build(&body).unwrap();
-    let loads = Loads { gravity: Vec3::NEG_Z, contacts: NodalContacts::none() };
+    let loads = Loads { gravity: Vec3::NEG_Z, contacts: NodalContacts::none(), ..Loads::default() };
     solver.step(&loads, 1.0);
     for (node, (now, rest)) in solver.positions().iter().zip(&body.mesh.positions).enumerate() {
         let fell = if fixed.contains(&(node as u32)) { 0.0 } else { 1.0 };

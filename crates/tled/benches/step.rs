@@ -66,6 +66,23 @@ fn averaged_pressure_and_prony(bencher: Bencher<'_, '_>) {
     steps(bencher, BRAIN, &Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..Config::default() });
 }
 
+/// Laws as the simulators run them, with averaged pressure and relaxation.
+#[divan::bench(args = ["neo-hookean", "stiffening", "ogden"])]
+fn law(bencher: Bencher<'_, '_>, name: &str) {
+    let stiffening =
+        Material::Stiffening { shear_mpa: 1e-3, share: 0.3, bound: 0.02, poisson: 0.45, density_g_mm3: 1e-3 };
+    let material = match name {
+        "stiffening" => stiffening,
+        "ogden" => Material::BRAIN_OGDEN,
+        _ => Material::BRAIN,
+    };
+    let body = Body { materials: vec![material], ..body(BRAIN) };
+    let config = Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..Config::default() };
+    let mut tled = Tled::new(&body, &config).expect("the block is sound");
+    let (loads, dt_ms) = (loads(), tled.stable_dt_ms());
+    bencher.counter(ItemsCount::new(body.mesh.tets.len())).bench_local(|| tled.step(&loads, dt_ms));
+}
+
 /// One pass alone, of a step with averaged pressure.
 #[divan::bench(args = Pass::ALL.map(Pass::name))]
 fn pass(bencher: Bencher<'_, '_>, name: &str) {

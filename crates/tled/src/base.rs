@@ -28,8 +28,6 @@ pub(crate) struct Base {
     pub bound: Bound,
     /// Mass-proportional damping α in use, 1/ms.
     pub damping_per_ms: f32,
-    /// Lowest frequency of the body at rest or its estimate, rad/ms.
-    pub lowest_per_ms: f32,
     pub max_displacement_mm: f32,
     pub supported: bool,
     /// Length of the last substep, ms; 0 before the first one.
@@ -57,7 +55,6 @@ impl Base {
                 Damping::Rate(rate) => rate,
                 Damping::Critical(share) => share * 2.0 * lowest_per_ms,
             },
-            lowest_per_ms,
             max_displacement_mm: config.max_displacement * body.mesh.bounds().size().max_element(),
             supported: body.is_supported(),
             elapsed_ms: 0.0,

@@ -17,7 +17,7 @@
 use crate::dynamic_scaling::DynamicScaling;
 use crate::element::{deformation, deformation_of, forces};
 use crate::law::{Constitutive, Deformation, Stress};
-use crate::relaxation::Fade;
+use crate::relaxation::{Fade, PRONY_TERMS};
 use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
 use trepan_soft::simd::{Lane, NODES, Quad, WIDTH};
@@ -53,7 +53,7 @@ pub(crate) struct Strain {
 pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     pub blocks: &'a [Block<K>],
     pub memory: &'a mut [Memory<T>],
-    pub fade: [Fade; 2],
+    pub fade: [Fade; PRONY_TERMS],
     pub u: &'a [Quad; NODES],
     /// Of every block with averaged pressure, else empty.
     pub strains: &'a [Strain],
@@ -161,7 +161,7 @@ pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
     material: &Material,
     constants: &[f32; K],
 ) -> f32 {
-    let at_rest = stiffness_at_rest(M::stress_at_rest(constants), M::moduli(constants));
+    let at_rest = stiffness_at_rest(M::at_rest(constants), M::moduli(constants));
     (element_omega2(shape, material) / f64::from(at_rest)) as f32
 }
 
@@ -186,8 +186,8 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let (own, (resistance, _)) = (d.j - L::splat(1.0), d.resistance());
                 let volume_change = if A { L::mean(self.averages, corners) } else { own } - resistance;
                 let moduli = M::moduli(&constants);
-                let gained = stiffness(&stress, moduli, &d, volume_change)
-                    - stiffness_at_rest(M::stress_at_rest(&constants), moduli);
+                let gained =
+                    stiffness(&stress, moduli, &d, volume_change) - stiffness_at_rest(M::at_rest(&constants), moduli);
                 let mut grown = L::load(&block.omega2, part) * gained;
                 if (L::splat(self.dynamic.limit) - grown).not_positive() > 0 {
                     grown =
@@ -238,7 +238,7 @@ fn relax<L: Lane, const T: usize>(
     stress: &mut Stress<L>,
     inverse: &[L; 6],
     memory: &mut Memory<T>,
-    fade: &[Fade; 2],
+    fade: &[Fade; PRONY_TERMS],
     part: usize,
 ) {
     let mut left = stress.s;

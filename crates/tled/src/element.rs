@@ -102,7 +102,7 @@ fn cross<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
+    use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, Stiffening};
     use glam::{DMat3, DVec3};
     use proptest::prelude::*;
     use trepan_soft::{Law, Shape};
@@ -127,15 +127,17 @@ mod tests {
             Law::StVenantKirchhoff { .. } => of_law::<L, StVenantKirchhoff, 2>(law, edges),
             Law::MooneyRivlin { .. } => of_law::<L, MooneyRivlin, 3>(law, edges),
             Law::Ogden { .. } => of_law::<L, Ogden, 5>(law, edges),
+            Law::Stiffening(_) => of_law::<L, Stiffening, 4>(law, edges),
         }
     }
 
-    fn laws() -> [Law; 4] {
+    fn laws() -> [Law; 5] {
         [
             Law::NeoHookean(trepan_soft::NeoHookean { mu: 0.001, kappa: 0.01 }),
             Law::StVenantKirchhoff { lambda: 0.01, mu: 0.001 },
             Law::MooneyRivlin { c10: 3e-4, c01: 2e-4, kappa: 0.01 },
             Law::Ogden { mu: [8e-4, 2e-4], alpha: [-4.7, 2.0], kappa: 0.01 },
+            Law::Stiffening(trepan_soft::Stiffening { mu: 0.001, share: 0.4, bound: 0.02, kappa: 0.01 }),
         ]
     }
 

@@ -81,6 +81,17 @@ impl Elements {
         self.team.report()
     }
 
+    /// Computes every element's forces from the nodes' displacements after `relaxed_ms` of rest
+    /// there; no part sleeps.
+    pub fn forces_at_rest(&mut self, relaxed_ms: f32) -> PassReport {
+        let still_mm = std::mem::take(&mut self.still_mm);
+        self.team.wake();
+        self.volumes(relaxed_ms);
+        let report = self.forces(relaxed_ms);
+        self.still_mm = still_mm;
+        report
+    }
+
     /// Adds the mass for stiffened elements to their nodes for the rest of a step, or takes it away
     /// again.
     pub fn weigh(&self, adds: bool) {
@@ -133,14 +144,16 @@ fn sorted(values: impl Iterator<Item = u32>) -> Vec<u32> {
 mod tests {
     use super::*;
     use trepan_soft::simd::Kernel;
-    use trepan_soft::{Material, boxes};
+    use trepan_soft::{Fluid, Material, boxes};
 
     #[test]
     fn kernels_give_the_same_bits_for_every_law_and_the_sum_of_all_forces_vanishes() {
         let mesh = boxes::split_box([3, 2, 3], Vec3::new(24.0, 16.0, 20.0));
         let stiff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
         let mooney = Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 };
-        for material in [Material::BRAIN, stiff, mooney, Material::BRAIN_OGDEN] {
+        let stiffening =
+            Material::Stiffening { shear_mpa: 1e-3, share: 0.4, bound: 0.02, poisson: 0.45, density_g_mm3: 1e-3 };
+        for material in [Material::BRAIN, stiff, mooney, Material::BRAIN_OGDEN, stiffening] {
             let body = Body::uniform(mesh.clone(), vec![], material);
             for (averaged, relaxation) in
                 [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, Relaxation::BRAIN)]
@@ -149,7 +162,7 @@ mod tests {
             }
         }
         let mut mixed = Body::uniform(mesh, vec![], Material::BRAIN);
-        mixed.materials.extend([stiff, mooney, Material::BRAIN_OGDEN, Material::TUMOUR]);
+        mixed.materials.extend([stiff, mooney, Material::BRAIN_OGDEN, stiffening]);
         mixed.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t * 7 % 5) as u8);
         compare(&mixed, false, Relaxation::NONE);
         compare(&mixed, true, Relaxation::BRAIN);
@@ -172,11 +185,25 @@ mod tests {
                 elements.forces(0.7)
             };
             let report = (0..3).map(|_| compute()).last();
+            let free = Update {
+                dt_ms: 1.0,
+                kick_ms: 1.0,
+                damping_per_ms: 0.0,
+                gravity: Vec3::ZERO,
+                fluid: Fluid::default(),
+                max_speed: 1.0,
+                max_displacement_mm: 1.0,
+                rigid: None,
+                calm_mm: 0.0,
+            };
             elements.weigh(true);
-            let masses: Vec<f32> = (0..count).map(|place| elements.nodes().present_inverse_mass(place)).collect();
+            let masses: Vec<f32> =
+                (0..count).map(|place| elements.nodes().present_inverse_mass(place, &free)).collect();
             assert!(masses != elements.nodes().inverse_mass);
             elements.weigh(false);
-            assert!((0..count).all(|n| elements.nodes().present_inverse_mass(n) == elements.nodes().inverse_mass[n]));
+            assert!(
+                (0..count).all(|n| elements.nodes().present_inverse_mass(n, &free) == elements.nodes().inverse_mass[n])
+            );
             (report, masses, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar, 1);

@@ -7,12 +7,15 @@
 //! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                    q_iso = 0, no κ term
 //! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF    q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
+//! stiffening           S = s μ g I + 2 h Q ⨯ FᵀF        q_iso = s μ/2 g' I₁ + h' tr(Q cofᵀF cof F)
 //! ```
 //! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3;
-//! `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1. Its reasons stand in
+//! Q is the power of cofᵀF cof F in `stiffening.rs` of `trepan-soft`, ⨯ the cross product of
+//! symmetric matrices; `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1. Its reasons stand in
 //! `trepan_soft::Law`, the f64 version of this file.
 
 use crate::principal::{Symmetric, principal};
+use crate::symmetric::{cross, gram, scale, square, trace, trace_of_product};
 use trepan_soft::simd::{Lane, squared};
 use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
 
@@ -34,6 +37,8 @@ pub(crate) struct Deformation<L> {
 pub(crate) struct Stress<L> {
     pub s: Symmetric<L>,
     pub q: L,
+    /// Bound of the law's own stiffening beyond s, times rest volume; 0 where s shows it.
+    pub stiffening: L,
 }
 
 /// Constitutive law with K constants per element.
@@ -47,6 +52,16 @@ pub(crate) trait Constitutive<const K: usize> {
     fn moduli<L: Lane>(constants: &[L; K]) -> (L, L);
     /// Returns the multiple of the unit tensor that s is at rest, N mm; q is its negative.
     fn stress_at_rest<L: Lane>(constants: &[L; K]) -> L;
+    /// Returns [`Stress::stiffening`] at rest, N mm.
+    #[inline(always)]
+    fn stiffening_at_rest<L: Lane>(_: &[L; K]) -> L {
+        L::splat(0.0)
+    }
+    /// Returns stress and stiffening at rest, N mm.
+    #[inline(always)]
+    fn at_rest<L: Lane>(constants: &[L; K]) -> (L, L) {
+        (Self::stress_at_rest(constants), Self::stiffening_at_rest(constants))
+    }
     /// Whether s is a multiple of the unit tensor, so that its other entries can be skipped.
     const ROUND: bool = false;
 }
@@ -55,6 +70,7 @@ pub(crate) struct NeoHookean;
 pub(crate) struct StVenantKirchhoff;
 pub(crate) struct MooneyRivlin;
 pub(crate) struct Ogden;
+pub(crate) struct Stiffening;
 
 impl<L: Lane> Deformation<L> {
     /// J^n continued linearly below J = 0.3, and its slope, from `at = max(J, 0.3)^n`.
@@ -91,19 +107,6 @@ impl<L: Lane> Deformation<L> {
     }
 }
 
-/// `AᵀA`, A given by rows.
-#[inline(always)]
-fn gram<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> Symmetric<L> {
-    [
-        a[0] * a[0] + b[0] * b[0] + c[0] * c[0],
-        a[1] * a[1] + b[1] * b[1] + c[1] * c[1],
-        a[2] * a[2] + b[2] * b[2] + c[2] * c[2],
-        a[0] * a[1] + b[0] * b[1] + c[0] * c[1],
-        a[0] * a[2] + b[0] * b[2] + c[0] * c[2],
-        a[1] * a[2] + b[1] * b[2] + c[1] * c[2],
-    ]
-}
-
 impl Constitutive<2> for NeoHookean {
     const ROUND: bool = true;
 
@@ -118,7 +121,7 @@ impl Constitutive<2> for NeoHookean {
         let (g, dg) = d.continued(d.root * d.root, L::splat(-2.0 / 3.0));
         let along_f = mu * g;
         let q_iso = mu * L::splat(0.5) * dg * squared(&d.f);
-        Stress { s: [along_f, along_f, along_f, zero, zero, zero], q: q_iso }
+        Stress { s: [along_f, along_f, along_f, zero, zero, zero], q: q_iso, stiffening: zero }
     }
 
     #[inline(always)]
@@ -144,7 +147,7 @@ impl Constitutive<2> for StVenantKirchhoff {
         let trace = ((b[0] - L::splat(1.0)) + (b[1] - L::splat(1.0)) + (b[2] - L::splat(1.0))) * L::splat(0.5);
         let along = lambda * trace - mu;
         let s = [along + mu * b[0], along + mu * b[1], along + mu * b[2], mu * b[3], mu * b[4], mu * b[5]];
-        Stress { s, q: L::splat(0.0) }
+        Stress { s, q: L::splat(0.0), stiffening: L::splat(0.0) }
     }
 
     #[inline(always)]
@@ -182,7 +185,7 @@ impl Constitutive<3> for MooneyRivlin {
             zero - second * b[4],
             zero - second * b[5],
         ];
-        Stress { s, q: c10 * dg * i1 + c01 * dh * squared(&d.c) }
+        Stress { s, q: c10 * dg * i1 + c01 * dh * squared(&d.c), stiffening: zero }
     }
 
     #[inline(always)]
@@ -209,7 +212,7 @@ impl Constitutive<5> for Ogden {
         let (one, q1) = term(scale1, alpha1, &squares, d);
         let (two, q2) = term(scale2, alpha2, &squares, d);
         let along = [one[0] + two[0], one[1] + two[1], one[2] + two[2]];
-        Stress { s: spread(&along, &axes), q: q1 + q2 }
+        Stress { s: spread(&along, &axes), q: q1 + q2, stiffening: L::splat(0.0) }
     }
 
     #[inline(always)]
@@ -224,6 +227,58 @@ impl Constitutive<5> for Ogden {
         constants[0] * constants[1] + constants[2] * constants[3]
     }
 }
+
+impl Constitutive<4> for Stiffening {
+    fn constants(law: &Law, volume_mm3: f64) -> [f32; 4] {
+        let Law::Stiffening(law) = *law else { return [0.0; 4] };
+        let moduli = [law.share * law.mu, law.coefficient(), law.kappa].map(|c| (c * volume_mm3) as f32);
+        [moduli[0], moduli[1], law.bound as f32, moduli[2]]
+    }
+
+    #[inline(always)]
+    fn stress<L: Lane>(&[mu, coefficient, bound, _]: &[L; 4], d: &Deformation<L>) -> Stress<L> {
+        let power = d.root * d.root;
+        let (g, dg) = d.continued(power, L::splat(-2.0 / 3.0));
+        let (h, dh) = d.continued(power * power, L::splat(-4.0 / 3.0));
+        let (green, inverse) = (gram(&d.f), gram(&d.c));
+        let b = scale(&inverse, h);
+        let t = (trace(&b) * L::splat(1.0 / 3.0)).at_least(1.0);
+        let fall = L::splat(1.0) / t;
+        let n = scale(&b, fall);
+        let n16 = square(&square(&square(&square(&n))));
+        let fall4 = (fall * fall) * (fall * fall);
+        let fall16 = (fall4 * fall4) * (fall4 * fall4);
+        let w = (L::splat(1.0) - L::splat(3.0) * bound) * (fall16 * fall) + bound * trace_of_product(&n16, &n);
+        let q = scale(&n16, coefficient * (t * w).sqrt().sqrt().sqrt().sqrt() / w);
+        let across = scale(&cross(&q, &green), L::splat(2.0) * h);
+        let (round, i1) = (mu * g, trace(&green));
+        let s = [across[0] + round, across[1] + round, across[2] + round, across[3], across[4], across[5]];
+        let through = trace_of_product(&q, &inverse);
+        let q_iso = L::splat(0.5) * mu * dg * i1 + dh * through;
+        let root3 = power * d.root;
+        let swollen = through * trace(&inverse) * root3 * root3;
+        Stress { s, q: q_iso, stiffening: L::splat(STIFFENING) * h * (trace(&q) * i1 + swollen) }
+    }
+
+    #[inline(always)]
+    fn moduli<L: Lane>(constants: &[L; 4]) -> (L, L) {
+        (constants[0] + L::splat(34.0) * constants[1], constants[3])
+    }
+
+    #[inline(always)]
+    fn stress_at_rest<L: Lane>(constants: &[L; 4]) -> L {
+        constants[0] + L::splat(4.0) * constants[1]
+    }
+
+    #[inline(always)]
+    fn stiffening_at_rest<L: Lane>(constants: &[L; 4]) -> L {
+        L::splat(18.0 * STIFFENING) * constants[1]
+    }
+}
+
+/// The tangent of the stiffening term in any direction of rank one is at most this times
+/// `h (tr Q I₁ + tr(Q cofᵀF cof F) |cof F|²/J²)`, found by sampling deformations.
+const STIFFENING: f32 = 5.5;
 
 /// One term of Ogden's law: s_i and its share of q_iso.
 #[inline(always)]

@@ -59,11 +59,12 @@ mod relaxation;
 mod scaling;
 mod settle;
 mod stiffness;
+mod symmetric;
 mod team;
 mod tled;
 
 pub use config::{Config, Damping};
-pub use relaxation::Relaxation;
+pub use relaxation::{PRONY_TERMS, Relaxation};
 pub use settle::{Settled, Settling};
 pub use tled::{Pass, Tled};
 pub use trepan_soft::simd::Kernel;

@@ -13,8 +13,8 @@ use glam::Vec4;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use trepan_geometry::Vec3;
-use trepan_soft::Body;
 use trepan_soft::simd::Layout;
+use trepan_soft::{Anchor, Body, Fluid};
 
 /// State of all nodes, by place.
 pub(crate) struct Nodes {
@@ -36,6 +36,8 @@ pub(crate) struct Nodes {
     /// Share of the mass that has weight (scaled mass has none).
     weight: Vec<f32>,
     rest: Vec<Vec4>,
+    /// Anchors; empty where the body has none.
+    anchors: Vec<Anchor>,
     /// Nodes clamped to a limit, and nodes reset because they were not finite, since `finish`.
     limited: AtomicU32,
     non_finite: AtomicU32,
@@ -50,6 +52,7 @@ pub(crate) struct Update {
     pub kick_ms: f32,
     pub damping_per_ms: f32,
     pub gravity: Vec3,
+    pub fluid: Fluid,
     pub max_speed: f32,
     pub max_displacement_mm: f32,
     pub rigid: Option<RigidMotion>,
@@ -62,6 +65,15 @@ impl Update {
     /// Factors on velocity, without unit, and on acceleration, ms.
     pub fn keep_and_gain(&self) -> [f32; 2] {
         keep_and_gain(self.damping_per_ms, self.kick_ms)
+    }
+
+    /// Acceleration of a node at a place in world space, mm/ms².
+    #[inline(always)]
+    fn weight_at(&self, place: Vec4) -> Vec4 {
+        match self.fluid.weight == Vec3::ZERO {
+            true => self.gravity.extend(0.0),
+            false => (self.gravity + self.fluid.weight * self.fluid.dryness(place.truncate())).extend(0.0),
+        }
     }
 
     /// What damping leaves of a node's velocity; a rigid motion of the whole body is not damped.
@@ -99,6 +111,15 @@ pub(crate) fn inverse_masses_and_weights(body: &Body, layout: &Layout, masses: &
     layout.node_at.iter().map(of).unzip()
 }
 
+/// The body's anchors by place, one for every node; none where it has none.
+pub(crate) fn anchors_by_place(body: &Body, layout: &Layout) -> Vec<Anchor> {
+    let mut anchors = vec![Anchor::default(); if body.anchors.is_empty() { 0 } else { layout.node_at.len() }];
+    for anchor in &body.anchors {
+        anchors[layout.place_of[anchor.node as usize] as usize] = *anchor;
+    }
+    anchors
+}
+
 impl Nodes {
     /// Creates nodes at rest with the given masses by mesh node, g. Added mass (mass scaling) has
     /// no weight.
@@ -116,6 +137,7 @@ impl Nodes {
             is_heavier: AtomicBool::new(false),
             weight,
             rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize].extend(0.0)).collect(),
+            anchors: anchors_by_place(body, layout),
             limited: AtomicU32::new(0),
             non_finite: AtomicU32::new(0),
         }
@@ -124,7 +146,7 @@ impl Nodes {
     /// Moves the nodes at some places by one substep.
     pub fn update(&self, places: Range<usize>, force_slots: &ForceSlots, update: &Update) {
         let [keep, gain] = update.keep_and_gain();
-        let (gravity, dt_ms) = (update.gravity.extend(0.0), update.dt_ms);
+        let (dt_ms, is_anchored) = (update.dt_ms, !self.anchors.is_empty());
         let square = |limit: f32| (limit * limit).min(f32::MAX);
         let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
         // Unneeded fields are neither read nor written: the update is limited by memory bandwidth,
@@ -143,6 +165,7 @@ impl Nodes {
             let is_beside_sleepers = force.w > 0.0;
             force.w = 0.0;
             let lightness = if is_heavier { self.lightness(place) } else { 1.0 };
+            let gravity = update.weight_at(self.rest[place] + u);
             let pull = (gravity * self.weight[place] + (force + external) * inverse_mass) * lightness;
             let mut is_pushed = external != Vec4::ZERO;
             if is_beside_sleepers {
@@ -157,6 +180,10 @@ impl Nodes {
                 self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
             }
             let velocity = update.carried(self.rest[place] + u, v, keep) + pull * gain;
+            let velocity = match is_anchored {
+                true => self.anchored(place, u, velocity, inverse_mass * lightness * gain, update),
+                false => velocity,
+            };
             let after = u + velocity * dt_ms;
             // False for NaN.
             let within = velocity.length_squared() <= fastest && after.length_squared() <= furthest;
@@ -174,13 +201,40 @@ impl Nodes {
             return v.truncate();
         }
         let [keep, gain] = update.keep_and_gain();
-        let carried = update.carried(self.rest[place] + u, v, keep).truncate();
-        carried + (update.gravity * self.weight[place] + force * inverse_mass) * (self.lightness(place) * gain)
+        let (at, lightness) = (self.rest[place] + u, self.lightness(place));
+        let pull = update.weight_at(at).truncate() * self.weight[place] + force * inverse_mass;
+        let velocity = update.carried(at, v, keep).truncate() + pull * (lightness * gain);
+        match self.anchors.is_empty() {
+            true => velocity,
+            false => self.anchored(place, u, velocity.extend(0.0), inverse_mass * lightness * gain, update).truncate(),
+        }
     }
 
-    /// 1/m with the mass that stiffened elements add, 1/g.
-    pub fn present_inverse_mass(&self, place: usize) -> f32 {
-        self.inverse_mass[place] * self.lightness(place)
+    /// What the anchor of the node at a place makes of its velocity, by backward Euler: stable at
+    /// any stiffness. `gain` is the velocity that a force gives the node, mm/ms for N.
+    #[inline(always)]
+    fn anchored(&self, place: usize, u: Vec4, velocity: Vec4, gain: f32, update: &Update) -> Vec4 {
+        let Anchor { normal, along, across, in_fluid, open_mm2, .. } = self.anchors[place];
+        if along + across + open_mm2 == 0.0 {
+            return velocity;
+        }
+        let (normal, fluid) = (normal.extend(0.0), &update.fluid);
+        let held = 1.0 - in_fluid * fluid.dryness((self.rest[place] + u).truncate());
+        let velocity = velocity + normal * (open_mm2 * fluid.opening_mpa * gain);
+        let reached = u + velocity * update.dt_ms;
+        let out = normal * reached.dot(normal);
+        let taken = |stiffness: f32| held * stiffness * gain / (1.0 + held * stiffness * gain * update.dt_ms);
+        velocity - out * taken(along) - (reached - out) * taken(across)
+    }
+
+    /// 1/m with the mass that stiffened elements add, 1/g, and less where an anchor holds the node:
+    /// what a contact's force changes of [`free_velocity`](Self::free_velocity).
+    pub fn present_inverse_mass(&self, place: usize, update: &Update) -> f32 {
+        let inverse_mass = self.inverse_mass[place] * self.lightness(place);
+        let Some(anchor) = self.anchors.get(place).filter(|anchor| anchor.along > 0.0) else { return inverse_mass };
+        let held = 1.0 - anchor.in_fluid * update.fluid.dryness(self.position(place));
+        let [_, gain] = update.keep_and_gain();
+        inverse_mass / (1.0 + held * anchor.along * inverse_mass * gain * update.dt_ms)
     }
 
     /// A node's mass without over that with what stiffened elements add; 1 for a fixed node.
@@ -253,6 +307,16 @@ impl Nodes {
     pub fn set(&self, place: usize, displacement: Vec3, velocity: Vec3) {
         self.u.set(place, displacement.extend(0.0).to_array());
         self.v.set(place, velocity.extend(0.0).to_array());
+    }
+
+    /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, N; zero for a fixed
+    /// node.
+    pub fn weight(&self, place: usize, gravity: Vec3) -> Vec3 {
+        if self.inverse_mass[place] == 0.0 {
+            Vec3::ZERO
+        } else {
+            gravity * (self.weight[place] / self.inverse_mass[place])
+        }
     }
 
     /// Velocity of the node at a place, mm/ms.

@@ -23,9 +23,9 @@ use crate::block::{Block, Forces, Memory, Strain, Volumes};
 use crate::config::Config;
 use crate::dynamic_scaling::DynamicScaling;
 use crate::force_slots::ForceSlots;
-use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
+use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, Stiffening};
 use crate::nodes::Nodes;
-use crate::relaxation::Fade;
+use crate::relaxation::{Fade, PRONY_TERMS};
 use crate::scaling::Scaling;
 use glam::Vec4;
 use std::marker::PhantomData;
@@ -63,7 +63,7 @@ pub(crate) const CALM: f32 = 0.1;
 /// Parameters of a force pass.
 #[derive(Clone, Copy)]
 pub(crate) struct Forcing {
-    pub fade: [Fade; 2],
+    pub fade: [Fade; PRONY_TERMS],
     pub averaged_pressure: bool,
     pub dynamic: DynamicScaling,
     pub quiet: Quiet,
@@ -224,7 +224,8 @@ impl Part {
     }
 }
 
-/// Elements of the law of `tets`. Only the neo-Hookean law has a version without stress memory.
+/// Elements of the law of `tets`. The neo-Hookean and the stiffening law have a version without
+/// stress memory.
 fn elements_of(
     body: &Body,
     scaling: &Scaling,
@@ -233,12 +234,15 @@ fn elements_of(
     config: &Config,
 ) -> Box<dyn LawElements> {
     let of = (body, scaling, config.averaged_pressure);
+    let elastic = config.relaxation.is_none();
     match body.material(tets[0] as usize).law() {
-        Law::NeoHookean(_) if config.relaxation.is_none() => Box::new(Blocks::<NeoHookean, 2, 0>::new(of, tets, nodes)),
-        Law::NeoHookean(_) => Box::new(Blocks::<NeoHookean, 2, 2>::new(of, tets, nodes)),
-        Law::StVenantKirchhoff { .. } => Box::new(Blocks::<StVenantKirchhoff, 2, 2>::new(of, tets, nodes)),
-        Law::MooneyRivlin { .. } => Box::new(Blocks::<MooneyRivlin, 3, 2>::new(of, tets, nodes)),
-        Law::Ogden { .. } => Box::new(Blocks::<Ogden, 5, 2>::new(of, tets, nodes)),
+        Law::NeoHookean(_) if elastic => Box::new(Blocks::<NeoHookean, 2, 0>::new(of, tets, nodes)),
+        Law::NeoHookean(_) => Box::new(Blocks::<NeoHookean, 2, PRONY_TERMS>::new(of, tets, nodes)),
+        Law::StVenantKirchhoff { .. } => Box::new(Blocks::<StVenantKirchhoff, 2, PRONY_TERMS>::new(of, tets, nodes)),
+        Law::MooneyRivlin { .. } => Box::new(Blocks::<MooneyRivlin, 3, PRONY_TERMS>::new(of, tets, nodes)),
+        Law::Ogden { .. } => Box::new(Blocks::<Ogden, 5, PRONY_TERMS>::new(of, tets, nodes)),
+        Law::Stiffening(_) if elastic => Box::new(Blocks::<Stiffening, 4, 0>::new(of, tets, nodes)),
+        Law::Stiffening(_) => Box::new(Blocks::<Stiffening, 4, PRONY_TERMS>::new(of, tets, nodes)),
     }
 }
 

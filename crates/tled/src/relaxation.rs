@@ -16,14 +16,17 @@
 use trepan_soft::BodyError;
 use trepan_soft::simd::Lane;
 
-/// Two Prony terms; a share of 0 = no term.
+/// Number of Prony terms.
+pub const PRONY_TERMS: usize = 3;
+
+/// Prony terms, [`PRONY_TERMS`] at most; a share of 0 = no term.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Relaxation {
     /// Relaxing share g_i of the instantaneous isochoric stress, without unit; each at least 0,
     /// together below 1.
-    pub share: [f32; 2],
+    pub share: [f32; PRONY_TERMS],
     /// Time constant τ_i, in which the share falls to 1/e, ms.
-    pub time_ms: [f32; 2],
+    pub time_ms: [f32; PRONY_TERMS],
 }
 
 /// Factors of one term for a step.
@@ -35,20 +38,20 @@ pub(crate) struct Fade {
 
 impl Relaxation {
     /// No relaxation: elastic.
-    pub const NONE: Self = Self { share: [0.0; 2], time_ms: [1.0; 2] };
+    pub const NONE: Self = Self { share: [0.0; PRONY_TERMS], time_ms: [1.0; PRONY_TERMS] };
 
     /// Brain after Miller and Chinzei 2002, uncalibrated: 45 % with a time constant of 0.5 s, 36.5
     /// % with 50 s.
-    pub const BRAIN: Self = Self { share: [0.450, 0.365], time_ms: [500.0, 50_000.0] };
+    pub const BRAIN: Self = Self { share: [0.450, 0.365, 0.0], time_ms: [500.0, 50_000.0, 1.0] };
 
     /// Whether there is no relaxation.
     pub fn is_none(&self) -> bool {
-        self.share == [0.0; 2]
+        self.share == [0.0; PRONY_TERMS]
     }
 
     /// Rejects invalid shares and times.
     pub fn check(&self) -> Result<(), BodyError> {
-        let total = self.share[0] + self.share[1];
+        let total: f32 = self.share.iter().sum();
         let is_right = self.share.iter().all(|g| *g >= 0.0) && total < 1.0;
         BodyError::check_config(is_right, "relaxation.share", total, "each at least 0 and together below 1")?;
         let terms = self.share.iter().zip(self.time_ms).filter(|(share, _)| **share > 0.0);
@@ -58,8 +61,8 @@ impl Relaxation {
     }
 
     /// Factors for a step of `dt_ms`; the same bits on every machine.
-    pub(crate) fn fade(&self, dt_ms: f32) -> [Fade; 2] {
-        [0, 1].map(|i| {
+    pub(crate) fn fade(&self, dt_ms: f32) -> [Fade; PRONY_TERMS] {
+        std::array::from_fn(|i| {
             let keep = Lane::exp2(-std::f32::consts::LOG2_E * dt_ms / self.time_ms[i].max(f32::MIN_POSITIVE));
             Fade { keep, gain: self.share[i] * (1.0 - keep) }
         })
@@ -78,20 +81,21 @@ mod tests {
                 && Relaxation::NONE.check().is_ok()
                 && Relaxation::default().check().is_ok()
         );
-        assert!(with([0.6, 0.4], [1.0, 1.0]).is_err() && with([-0.1, 0.4], [1.0, 1.0]).is_err());
-        assert!(with([0.1, 0.0], [0.0, 0.0]).is_err() && with([f32::NAN, 0.0], [1.0, 1.0]).is_err());
+        assert!(with([0.3, 0.3, 0.4], [1.0; 3]).is_err() && with([-0.1, 0.4, 0.0], [1.0; 3]).is_err());
+        assert!(with([0.1, 0.0, 0.0], [0.0; 3]).is_err() && with([f32::NAN, 0.0, 0.0], [1.0; 3]).is_err());
     }
 
     #[test]
     fn a_constant_stress_relaxes_to_the_remaining_share() {
-        let relaxation = Relaxation { share: [0.4, 0.2], time_ms: [10.0, 100.0] };
-        let (mut memory, dt) = ([0.0f32; 2], 0.5);
+        let relaxation = Relaxation { share: [0.4, 0.2, 0.1], time_ms: [10.0, 100.0, 400.0] };
+        let (mut memory, dt) = ([0.0f32; PRONY_TERMS], 0.5);
         for step in 0..4000 {
             let fade = relaxation.fade(dt);
-            (0..2).for_each(|i| memory[i] = fade[i].keep * memory[i] + fade[i].gain);
+            (0..PRONY_TERMS).for_each(|i| memory[i] = fade[i].keep * memory[i] + fade[i].gain);
             let t = dt * (step + 1) as f32;
-            let exact = 0.4 * (1.0 - (-t / 10.0).exp()) + 0.2 * (1.0 - (-t / 100.0).exp());
-            assert!((memory[0] + memory[1] - exact).abs() < 1e-4, "{t}");
+            let term = |i: usize| relaxation.share[i] * (1.0 - (-t / relaxation.time_ms[i]).exp());
+            let exact: f32 = (0..PRONY_TERMS).map(term).sum();
+            assert!((memory.iter().sum::<f32>() - exact).abs() < 1e-4, "{t}");
         }
     }
 }

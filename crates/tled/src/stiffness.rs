@@ -10,7 +10,8 @@
 //!
 //! # Practice
 //! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of
-//! a neo-Hookean solid with the same moduli; their additional stiffening is in the first term.
+//! a neo-Hookean solid with the same moduli; their additional stiffening is in the first term. The
+//! stiffening law, whose tangent is many times its stress, gives a bound of its own in addition.
 
 use crate::law::{Deformation, Stress};
 use trepan_soft::simd::{Lane, dot, squared};
@@ -27,14 +28,14 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     let resistance = kappa * d.resistance().1;
     let volume = kappa + resistance + L::splat(5.0 / 9.0) * mu * i1 * power;
     let turning = magnitude(stress.q + kappa * volume_change) * i1.sqrt();
-    itself + volume * largest_eigenvalue(&d.c) + turning
+    itself + stress.stiffening + volume * largest_eigenvalue(&d.c) + turning
 }
 
 /// The bound at rest times rest volume, from the multiple of the unit tensor that the isochoric
-/// stress is at rest.
+/// stress is at rest, and the law's own stiffening there.
 #[inline(always)]
-pub(crate) fn stiffness_at_rest<L: Lane>(stress: L, (mu, kappa): (L, L)) -> L {
-    L::splat(3.0 + 3f32.sqrt()) * magnitude(stress) + kappa + L::splat(5.0 / 3.0) * mu
+pub(crate) fn stiffness_at_rest<L: Lane>((stress, stiffening): (L, L), (mu, kappa): (L, L)) -> L {
+    L::splat(3.0 + 3f32.sqrt()) * magnitude(stress) + stiffening + kappa + L::splat(5.0 / 3.0) * mu
 }
 
 /// Upper bound of the largest eigenvalue of `CᵀC`, C given by rows.
@@ -58,17 +59,19 @@ fn magnitude<L: Lane>(x: L) -> L {
 mod tests {
     use super::*;
     use crate::element::deformation;
-    use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
+    use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, Stiffening};
     use glam::{DMat3, DVec3};
     use proptest::prelude::*;
     use trepan_soft::Law;
+
+    const STIFFENING: Law = Law::Stiffening(trepan_soft::Stiffening { mu: 1.0, share: 0.3, bound: 0.02, kappa: 9.0 });
 
     fn at_rest<M: Constitutive<K>, const K: usize>(law: Law) -> [f32; 2] {
         let constants = M::constants(&law, 1.0);
         let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
         let moduli = M::moduli(&constants);
         let general = stiffness(&M::stress(&constants, &rest), moduli, &rest, 0.0);
-        [general, stiffness_at_rest(M::stress_at_rest(&constants), moduli)]
+        [general, stiffness_at_rest(M::at_rest(&constants), moduli)]
     }
 
     #[test]
@@ -78,10 +81,16 @@ mod tests {
             at_rest::<StVenantKirchhoff, 2>(Law::StVenantKirchhoff { lambda: 7.0, mu: 2.0 }),
             at_rest::<MooneyRivlin, 3>(Law::MooneyRivlin { c10: 0.3, c01: 0.2, kappa: 9.0 }),
             at_rest::<Ogden, 5>(Law::Ogden { mu: [0.8, 0.2], alpha: [-4.7, 2.0], kappa: 9.0 }),
+            at_rest::<Stiffening, 4>(STIFFENING),
         ];
         for [general, closed] in cases {
             assert!((general / closed - 1.0).abs() < 1e-5, "{general} {closed}");
         }
+    }
+
+    fn bound<M: Constitutive<K>, const K: usize>(law: &Law, d: &Deformation<f32>) -> f32 {
+        let constants = M::constants(law, 1.0);
+        stiffness(&M::stress(&constants, d), M::moduli(&constants), d, d.j - 1.0 - d.resistance().0)
     }
 
     proptest! {
@@ -89,17 +98,17 @@ mod tests {
         fn no_direction_is_stiffer_than_the_bound(x in proptest::array::uniform9(-1.2f32..1.2), n in proptest::array::uniform6(-1.0f64..1.0)) {
             let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             let d = deformation(&[[x[0], x[1], x[2]], [x[3], x[4], x[5]], [x[6], x[7], x[8]]], &unit);
-            let law = Law::NeoHookean(trepan_soft::NeoHookean { mu: 1.0, kappa: 9.0 });
-            let constants = NeoHookean::constants(&law, 1.0);
-            let bound = stiffness(&NeoHookean::stress(&constants, &d), NeoHookean::moduli(&constants), &d, d.j - 1.0 - d.resistance().0);
+            let round = Law::NeoHookean(trepan_soft::NeoHookean { mu: 1.0, kappa: 9.0 });
             let f = DMat3::from_cols_array(&[
                 d.f[0][0], d.f[1][0], d.f[2][0], d.f[0][1], d.f[1][1], d.f[2][1], d.f[0][2], d.f[1][2], d.f[2][2],
             ].map(f64::from));
             let (a, b) = (DVec3::new(n[0], n[1], n[2]).normalize_or_zero(), DVec3::new(n[3], n[4], n[5]).normalize_or_zero());
             let change = DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-            let along = law.stress_change(f, change);
-            let computed = along.x_axis.dot(change.x_axis) + along.y_axis.dot(change.y_axis) + along.z_axis.dot(change.z_axis);
-            prop_assert!(computed <= f64::from(bound) * 1.0001, "{computed} {bound}");
+            for (law, bound) in [(round, bound::<NeoHookean, 2>(&round, &d)), (STIFFENING, bound::<Stiffening, 4>(&STIFFENING, &d))] {
+                let along = law.stress_change(f, change);
+                let computed = along.x_axis.dot(change.x_axis) + along.y_axis.dot(change.y_axis) + along.z_axis.dot(change.z_axis);
+                prop_assert!(computed <= f64::from(bound) * 1.0001, "{law:?} {computed} {bound}");
+            }
         }
     }
 }

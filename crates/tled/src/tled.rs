@@ -7,18 +7,21 @@ use crate::nodes::{Nodes, Update, kick_ms};
 use crate::part::CALM;
 use trepan_geometry::Vec3;
 use trepan_soft::{
-    Body, BodyError, FreeNode, Gain, ImplicitSprings, Loads, NodeState, SoftSolver, StepReport, SurfacePressure,
+    Body, BodyError, Fluid, FreeNode, Gain, ImplicitSprings, Loads, NodeState, SoftSolver, StepReport, SurfacePressure,
 };
 
 /// Total Lagrangian explicit solver of one body.
 pub struct Tled {
     pub(crate) base: Base,
     pub(crate) elements: Elements,
-    springs: ImplicitSprings,
+    /// The body at rest.
+    pub(crate) body: Body,
+    pub(crate) springs: ImplicitSprings,
     /// Surface pressure, its triangles given by place.
-    pressure: SurfacePressure,
+    pub(crate) pressure: SurfacePressure,
     mass_added: f32,
     gravity: Vec3,
+    fluid: Fluid,
     /// Largest growth of an element's ω² in the last pass, 1/ms².
     growth: f32,
 }
@@ -52,7 +55,8 @@ impl Tled {
     /// Does one substep of at most `left_ms` and returns its length, ms. The length is the longest
     /// that is stable for the deformed elements and divides `left_ms` evenly.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
-        if std::mem::replace(&mut self.gravity, loads.gravity) != loads.gravity {
+        if (self.gravity, self.fluid) != (loads.gravity, loads.fluid) {
+            (self.gravity, self.fluid) = (loads.gravity, loads.fluid);
             self.elements.wake();
         }
         self.elements.volumes(self.base.elapsed_ms);
@@ -77,7 +81,7 @@ impl Tled {
         let free = |n: u32| FreeNode {
             position: nodes.position(place(n)),
             velocity: nodes.free_velocity(place(n), elements.force(place(n)), update),
-            inverse_mass: nodes.present_inverse_mass(place(n)),
+            inverse_mass: nodes.present_inverse_mass(place(n), update),
         };
         let step = Gain { dt_ms: update.dt_ms, gain_ms: update.keep_and_gain()[1] };
         report.contact_n = self.springs.press(&loads.contacts, step, free, |n, force| nodes.push(place(n), force));
@@ -102,6 +106,7 @@ impl Tled {
             kick_ms: kick_ms(self.base.elapsed_ms, dt_ms),
             damping_per_ms,
             gravity: loads.gravity - config.balanced_gravity,
+            fluid: loads.fluid,
             max_speed: config.max_speed,
             max_displacement_mm: self.base.max_displacement_mm,
             rigid,
@@ -116,11 +121,13 @@ impl Tled {
         let nodes = Nodes::of(body, &base.layout, &masses);
         Ok(Self {
             gravity: Vec3::ZERO,
+            fluid: Fluid::default(),
             growth: 0.0,
             elements: Elements::of(body, &base.layout, (&scaling, base.dynamic_scaling()), nodes, config),
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             mass_added: scaling.added as f32,
+            body: body.clone(),
             base,
         })
     }
@@ -206,10 +213,10 @@ impl Tled {
         }
     }
 
-    /// Sets all velocities to zero.
-    pub(crate) fn stop(&mut self) {
-        let nodes = self.elements.nodes();
-        (0..nodes.u.len()).for_each(|place| nodes.set(place, nodes.displacement(place), Vec3::ZERO));
+    /// Takes the present displacements, with zero velocities, for the start of a motion.
+    pub(crate) fn rest(&mut self) {
+        self.elements.wake();
+        self.base.elapsed_ms = 0.0;
         self.publish();
     }
 

@@ -149,7 +149,7 @@ fn a_hard_hit_at_the_full_step_is_survived_by_substeps() {
     boxes::nodes_where(&body.mesh, |p| p.z > 39.0 && p.x < 31.0).iter().for_each(|&n| contact.add(n, 1.0));
     contact.normalise();
     (contact.normal, contact.offset_mm, contact.stiffness) = (Vec3::Z, 6.0 - 40.0, 0.5);
-    let loads = Loads { gravity: Vec3::X * 9.81e-3, contacts: contact.into() };
+    let loads = Loads { gravity: Vec3::X * 9.81e-3, contacts: contact.into(), ..Loads::default() };
     let dt = tled.stable_dt_ms();
     let mut most = 0;
     for _ in 0..1500 {

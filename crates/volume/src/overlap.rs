@@ -3,7 +3,7 @@
 use crate::VoxelVolume;
 use glam::DVec3;
 
-/// Smallest fraction of the smaller image's box that the other must cover.
+/// A numerical parameter: smallest fraction of the smaller image's box that the other must cover.
 pub const LEAST_SHARE: f64 = 0.25;
 
 /// Two images that do not overlap.

@@ -55,7 +55,7 @@ pub fn hounsfield(ct: &VoxelVolume<f32>) -> Result<VoxelVolume<i16>, HounsfieldE
     }
 }
 
-/// Values at or under this are air in a CT, HU.
+/// A numerical parameter: values at or under this are air in a CT, HU.
 const AIR_AT_MOST_HU: f32 = -900.0;
 
 /// Smallest fraction of a CT's voxels that is air.

@@ -1,6 +1,7 @@
 //! Limits of the guard, and what it counts.
 
 use crate::passivity::PassivityConfig;
+use trepan_measurements::devices;
 
 /// Limits of the guard.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,10 +35,10 @@ pub struct GuardConfig {
 impl Default for GuardConfig {
     fn default() -> Self {
         Self {
-            max_force_n: 3.3,
+            max_force_n: devices::TOUCH_PEAK_FORCE.f32(),
             continuous_force_n: f32::INFINITY,
             heat_ms: 30_000.0,
-            max_torque_nmm: 188.0,
+            max_torque_nmm: devices::TOUCH_TORQUE.f32(),
             slew_n_per_ms: 0.5,
             torque_slew_nmm_per_ms: 20.0,
             ramp_in_ms: 300.0,

@@ -61,7 +61,8 @@ use trepan_geometry::Vec3;
 
 /// Most ticks between a force and the hand.
 const MAX_DELAY: usize = 4;
-/// Damping for each N mm that was made, N ms/mm: full damping at half of the usual advance.
+/// A numerical parameter: damping for each N mm that was made, N ms/mm, full damping at half of the
+/// usual advance.
 const DAMPING_PER_NMM: f64 = 400.0;
 /// Part of the hand's way that the next tick may add to it.
 const SURPRISE: f32 = 0.2;
@@ -102,7 +103,7 @@ pub struct PassivityConfig {
 }
 
 impl PassivityConfig {
-    /// For a Touch whose driver applies each force at once.
+    /// For a Touch whose driver applies each force at once: numerical parameters of the controller.
     pub const TOUCH: Self = Self {
         max_damping: 10.0,
         damping_memory_ms: 3000.0,

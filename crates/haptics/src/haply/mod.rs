@@ -40,6 +40,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Pose, Quat, ToolState, Twist, Vec3};
+use trepan_measurements::devices;
 use triple_buffer::{Input, Output, triple_buffer};
 use websocket::WebSocket;
 
@@ -183,8 +184,8 @@ impl HapticDevice for Haply {
     fn capabilities(&self) -> Capabilities {
         Capabilities {
             name: self.name.clone(),
-            peak_force_n: 10.0,
-            continuous_force_n: 2.0,
+            peak_force_n: devices::INVERSE3_PEAK_FORCE.f32(),
+            continuous_force_n: devices::INVERSE3_CONTINUOUS_FORCE.f32(),
             workspace_mm: Vec3::splat(300.0),
             axes_driven: 3,
             position_resolution_mm: 0.1,

@@ -11,7 +11,7 @@ use crate::dynamic::{Loaded, functions, owned};
 use std::ffi::{CString, c_char, c_ulong, c_void};
 use std::path::Path;
 
-/// Scheduler rate, Hz.
+/// Scheduler rate, Hz, numerical.
 pub(super) const RATE_HZ: u32 = 1000;
 
 const NAMES: &[&str] = if cfg!(windows) {

@@ -40,6 +40,7 @@ use servo::{Command, Sample, Servo};
 use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3};
+use trepan_measurements::devices;
 use triple_buffer::{Input, Output, triple_buffer};
 
 /// `openhaptics[:NAME]`: by the name in the maker's set-up tool. The list only says whether the
@@ -228,8 +229,8 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
         position_resolution_mm: 0.055,
         delay_ticks: 1,
         // The lightest device of the family.
-        moving_mass_g: 45.0,
-        damping: 0.1,
+        moving_mass_g: devices::TOUCH_MASS.f32(),
+        damping: devices::TOUCH_DAMPING.f32(),
     };
     hd.drain_errors();
     capabilities

@@ -1,6 +1,7 @@
 //! Builds and opens cases from a patient's files.
 
 pub(crate) mod anatomy;
+pub(crate) mod anchors;
 pub(crate) mod cache;
 pub(crate) mod choice;
 mod fit;

@@ -74,6 +74,11 @@ impl Plan {
         within(self.hole(), self.hole_mm) || self.flap_mm > 0.0 && within(self.site.entry, self.flap_mm + HALF_CUT_MM)
     }
 
+    /// Whether the plan bares a place of the brain's surface, whose normal points out of it.
+    pub fn bares(&self, place: Vec3, normal: Vec3) -> bool {
+        self.takes(place) && normal.dot(self.site.inward) < 0.0
+    }
+
     /// The voxels of a skull that are planned to be removed, in their order.
     pub fn of(&self, skull: &VoxelVolume<i16>, isovalue: i16) -> Vec<usize> {
         let [nx, ny, _] = skull.dims;

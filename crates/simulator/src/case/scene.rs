@@ -9,13 +9,12 @@ use glam::{DAffine3, IVec3};
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
+use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.
-const FIXED_BY_BONE_MM: f32 = 6.0;
-/// The lower part of the brain, as a share of its height.
-const LOWER_PART: f32 = 0.35;
+const FIXED_BY_BONE_MM: f32 = support::BASE_REACH.f32();
 /// Margin of a distance field around tissue, mm: more than the widest tool's radius and its warning
 /// distance.
 const ROOM_MM: f32 = 9.0;
@@ -44,7 +43,7 @@ pub struct RestBrain {
     pub mesh: TetMesh,
     /// Class code of each tetrahedron.
     pub class_of_tet: Vec<u8>,
-    /// Nodes that do not move.
+    /// Nodes of its base, which do not move where nothing else holds it.
     pub fixed: Vec<u32>,
     /// Distance to its surface, mm, negative inside.
     pub field: Arc<DistanceField>,
@@ -116,7 +115,7 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
             "too little bone lies under the brain to support it: the nodes of its lowest fifth are fixed instead"
                 .into(),
         );
-        fixed = below(&brain.mesh, 0.2);
+        fixed = below(&brain.mesh, support::BARE_BASE_HEIGHT.f32());
     }
     let marked = TissueClass::ALL.map(TissueClass::tint);
     let tint_of = |&code: &u8| marked.get(usize::from(code).wrapping_sub(1)).copied().unwrap_or([0; 3]);
@@ -131,13 +130,14 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
 fn fixed_by_bone(mesh: &TetMesh, bone: &BoneVolume) -> Vec<u32> {
     let mut on_surface = vec![false; mesh.positions.len()];
     Surface::of(mesh).triangles.iter().flatten().for_each(|&node| on_surface[node as usize] = true);
-    below(mesh, LOWER_PART)
+    below(mesh, support::BASE_HEIGHT.f32())
         .into_iter()
         .filter(|&node| on_surface[node as usize] && near_bone(mesh.positions[node as usize], bone))
         .collect()
 }
 
-fn below(mesh: &TetMesh, share: f32) -> Vec<u32> {
+/// Nodes up to a share of the mesh's height.
+pub(super) fn below(mesh: &TetMesh, share: f32) -> Vec<u32> {
     let bounds = mesh.bounds();
     let top = bounds.min.z + share * bounds.size().z;
     (0..mesh.positions.len() as u32).filter(|&node| mesh.positions[node as usize].z <= top).collect()

@@ -30,11 +30,13 @@ pub(crate) struct Space<'a> {
 /// | off by 10 degrees and 10 mm | 0.01 to 0.05 | 0.68 | 9 to 16 |
 /// | off by 20 degrees and 30 mm | 0.15 to 0.29 | 0.5 | 26 to 39 |
 /// | of two patients | 0.27 | 0.44 | 37 |
+///
+/// These are numerical parameters.
 const DOUBTFUL: BrainFit = BrainFit { outside_share: 0.03, filled_share: 0.5, middles_mm: 8.0 };
 
-/// Limits beyond which the images are refused; measured values are at [`DOUBTFUL`]. The limit of
-/// the filled share is low, because an old brain, or a mask without the fluid around the brain,
-/// fills little.
+/// Numerical limits beyond which the images are refused; measured values are at [`DOUBTFUL`].
+/// The limit of the filled share is low, because an old brain, or a mask without the fluid around
+/// the brain, fills little.
 const APART: BrainFit = BrainFit { outside_share: 0.1, filled_share: 0.3, middles_mm: 20.0 };
 
 /// Whether a fit lies beyond a limit.

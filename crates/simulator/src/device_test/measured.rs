@@ -164,7 +164,7 @@ impl Timing {
         let rate = |count: usize| count.saturating_sub(1) as f64 / seconds.max(1e-3);
         Self {
             seconds,
-            asked_hz: 1e3 / run.tick_ms,
+            asked_hz: 1e3 / run.tick_ms, // by definition
             tick_hz: rate(samples.len()),
             fresh_hz: rate(samples.iter().filter(|s| s.fresh).count()),
             late_ticks: run.late,

@@ -1,6 +1,6 @@
 //! The table of keys that `--set` takes, and what derives from it: parsing, lists, the user guide.
 
-use super::{Element, Ingredients, Law, Relaxation, SolverDevice};
+use super::{Element, Ingredients, Law, Relaxation, SolverDevice, Support};
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use trepan_budget::Quality;
@@ -276,6 +276,18 @@ pub const KEYS: &[Key] = &[
         set: |i, text| switch(text).map(|on| i.folds = on),
         ..Key::of(Part::Tissue)
     },
+    Key {
+        name: "support",
+        values: names::<Support>,
+        about: "what holds the brain in the skull; anchored: stem, arachnoid, falx, bridging veins, fluid that drains",
+        usual: Some("base"),
+        presets: &[(Quality::Auto, "anchored"), (Quality::Fine, "anchored")],
+        compared: others::<Support>,
+        realistic: Some("anchored"),
+        get: |i| Some(name(&i.support)),
+        set: |i, text| value(text).map(|support| i.support = support),
+        ..Key::of(Part::Tled)
+    },
 ];
 
 /// Friction coefficients that are compared with none: a wet tool on brain and a metal one on bone,
@@ -545,6 +557,7 @@ mod tests {
             "search=hashed-grid",
             "friction=0.2",
             "folds=on",
+            "support=anchored",
         ]);
         let mut again = Ingredients::default();
         for key in KEYS {
@@ -569,6 +582,7 @@ mod tests {
             relaxation: Relaxation::Prony,
             friction: 0.1,
             bone_friction: 0.3,
+            support: Support::Anchored,
             ..Ingredients::default()
         };
         let all = Quality::ALL.map(Ingredients::of);

@@ -57,6 +57,8 @@ pub struct Ingredients {
     pub friction: f32,
     /// Contact of the brain's surface with itself.
     pub folds: bool,
+    /// What holds the brain in the skull.
+    pub support: Support,
 }
 
 /// Usual [`Ingredients::dynamic_mass_scaling`].
@@ -78,6 +80,15 @@ pub enum Relaxation {
     Off,
     /// Prony series of two terms.
     Prony,
+}
+
+/// What holds the brain in the skull, and what it does once the dura is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Support {
+    /// Fixed nodes at its base; a body force on the whole brain.
+    Base,
+    /// Stem, arachnoid, falx, bridging veins; fluid that drains, pressure in the opening.
+    Anchored,
 }
 
 /// Where the solver of the tissue runs.
@@ -111,6 +122,7 @@ impl Default for Ingredients {
             search: trepan_deformable::Method::RECOMMENDED,
             friction: 0.0,
             folds: false,
+            support: Support::Base,
         }
     }
 }

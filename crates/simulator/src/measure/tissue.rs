@@ -105,7 +105,7 @@ const LONGEST_MS: [f32; 2] = [1.0, 4.0];
 const LOOK: (f32, u32) = (5.0, 150);
 /// Motion below which a push does not distinguish meshes, mm.
 pub const LEAST_MM: f64 = 0.1;
-/// Share of the brain's height below which its surface nodes are fixed.
+/// A numerical parameter: share of the brain's height below which its surface nodes are fixed.
 const FIXED_SHARE: f32 = 0.35;
 
 /// All choices for tissue.

@@ -300,7 +300,7 @@ impl Models {
 /// Height of the 3-D view at the opening, mm.
 const VIEW_MM: f64 = 105.0;
 
-/// Frame rate of a window, Hz.
+/// Frame rate of a window, Hz, numerical.
 const LIVE_HZ: f64 = 10.0;
 
 /// Force with which a hand presses a burr, N.

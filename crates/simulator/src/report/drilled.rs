@@ -23,13 +23,13 @@ use std::collections::BinaryHeap;
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BetweenScratch, BoneVolume, VoxelVolume, cut_depth};
 
-/// Density from which a voxel may hold some bone, HU: above soft tissue.
+/// A numerical parameter: density from which a voxel may hold some bone, HU, above soft tissue.
 const DENSE_HU: i16 = 100;
 /// Largest distance at which a dense voxel takes the share of the nearest bone, mm.
 const REACH_MM: f64 = 3.0;
 /// Largest number of points along an edge of a voxel.
 const MAX_POINTS: f64 = 24.0;
-/// Steepness with which the cut lowers densities on its nodes, HU a node.
+/// A numerical parameter: steepness with which the cut lowers densities on its nodes, HU a node.
 const RAMP_HU: f32 = 500.0;
 /// Margin of bone around what was removed, mm.
 const MARGIN_MM: f64 = 2.0;

@@ -85,7 +85,7 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
         ends.patch.set((record.seq, *stage.patch()));
         ends.loads.write(|(seq, loads)| {
             *seq = record.seq;
-            loads.gravity = stage.loads().gravity;
+            (loads.gravity, loads.fluid) = (stage.loads().gravity, stage.loads().fluid);
             loads.contacts.copy_from(&stage.loads().contacts);
         });
         let done_ms = clock.now_ms();

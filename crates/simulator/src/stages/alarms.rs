@@ -13,7 +13,7 @@ use crate::stages::drill::{BREAK_MM, THIN_MM};
 use crate::stages::notice::Warning;
 use crate::stages::score::cuts_into_brain;
 use trepan_link::wire::TickRecord;
-use trepan_measurements::hands;
+use trepan_measurements::{grip, hands};
 
 /// Time until breakthrough under which a warning is raised, ms.
 const SOON_MS: f32 = hands::WARNING_SOON.f32();
@@ -88,7 +88,7 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             near_mm: hands::WARNING_NEAR.f32(),
-            brain_force_n: hands::WARNING_PRESS.f32(),
+            brain_force_n: grip::BRAIN_FORCE_WARNING.f32(),
             forbidden_mm: hands::WARNING_FORBIDDEN.f32(),
         }
     }

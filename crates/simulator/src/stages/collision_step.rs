@@ -26,7 +26,7 @@ impl CollisionStage {
         let shaft = self.step.shaft;
         let arm_mm = if self.with_torque { shaft.point - sample.state.tip() } else { Vec3::ZERO };
         self.patch = self.step.patch.with(shaft.normal, shaft.depth_mm, arm_mm);
-        self.loads.gravity = self.settling.at(sample.phase(), sample.state.time_ms);
+        self.settling.load(sample.phase(), sample.state.time_ms, &mut self.loads);
         self.press(sample.phase(), soft);
         self.seq += 1;
         CollisionRecord {
@@ -123,7 +123,7 @@ impl CollisionStage {
             under_pressure: false,
             patch: SurfacePatch::default(),
             settling: Settling::default(),
-            loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
+            loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
             step: TissueStep::default(),
             seq: 0,
         })
@@ -147,7 +147,7 @@ impl CollisionStage {
         Self { under_pressure, ..self }
     }
 
-    /// Adds the body force on the brain once the dura is open.
+    /// Adds the loads on the brain once the dura is open.
     pub fn settling(self, settling: Settling) -> Self {
         Self { settling, ..self }
     }

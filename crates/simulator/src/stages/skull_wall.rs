@@ -22,7 +22,7 @@
 use glam::IVec3;
 use std::sync::Arc;
 use trepan_contact::NodalContacts;
-use trepan_deformable::{ConfigError, Hollow, SlidingWall};
+use trepan_deformable::{BorderNode, ConfigError, Hollow, SlidingWall};
 use trepan_geometry::Vec3;
 use trepan_mesh::TetMesh;
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
@@ -102,6 +102,16 @@ impl SkullWall {
         wall.ahead_mm = NEAR_MM;
         wall.rest_in(&brain.positions, |p| (field.sample(p), Vec3::ZERO));
         Ok(Self { wall, field, before: BoneMask::of(&bone), bone, receded_mm: vec![0.0; brain.positions.len()] })
+    }
+
+    /// Distance of a place to the wall at rest, mm; negative in bone.
+    pub fn gap_mm(&self, place: Vec3) -> f32 {
+        self.field.sample(place)
+    }
+
+    /// The nodes that may meet the wall.
+    pub fn border(&self) -> &[BorderNode] {
+        self.wall.border()
     }
 
     /// Adds the contact planes of nodes near the wall. `reads_bone`: nothing is carved, so openings

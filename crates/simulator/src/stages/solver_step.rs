@@ -24,7 +24,7 @@ impl SolverStage {
     pub fn step(&mut self, loads: &Loads, contact_seq: u64) -> Option<SolverRecord> {
         let switched = contact_seq != self.contact_seq;
         if switched {
-            self.loads.gravity = loads.gravity;
+            (self.loads.gravity, self.loads.fluid) = (loads.gravity, loads.fluid);
             self.loads.contacts.copy_from(&loads.contacts);
             self.contact_seq = contact_seq;
             self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
@@ -140,7 +140,7 @@ impl SolverStage {
             rest: solver.positions().to_vec(),
             solver,
             time_ms: 0.0,
-            loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
+            loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
             steps: 0,
             contact_seq: 0,
             solver_faults: SolverFaults::default(),

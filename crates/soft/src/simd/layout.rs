@@ -45,6 +45,7 @@ pub fn kind(body: &Body, tet: u32) -> u8 {
         Law::StVenantKirchhoff { .. } => 1,
         Law::MooneyRivlin { .. } => 2,
         Law::Ogden { .. } => 3,
+        Law::Stiffening(_) => 4,
     }
 }
 

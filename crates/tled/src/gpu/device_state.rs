@@ -1,7 +1,7 @@
 //! What the device keeps between steps: the nodes' state and the numbers of the step, as
 //! `step.wgsl` declares them.
 
-use crate::nodes::inverse_masses_and_weights;
+use crate::nodes::{anchors_by_place, inverse_masses_and_weights};
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_soft::Body;
 use trepan_soft::simd::Layout;
@@ -20,10 +20,48 @@ pub(crate) struct Step {
     pub elements: u32,
     pub nodes: u32,
     pub node_groups: u32,
-    pub fade_keep: [f32; 2],
-    pub fade_gain: [f32; 2],
+    pub fade_keep: [f32; 4],
+    pub fade_gain: [f32; 4],
     pub planes: u32,
-    pub unused: [u32; 3],
+    pub opening_mpa: f32,
+    pub unused: [u32; 2],
+    pub up: [f32; 3],
+    pub level_mm: f32,
+    pub weight: [f32; 3],
+    pub unused_too: u32,
+}
+
+/// Place at rest and anchor of a node, as `fluid.wgsl` declares them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct AnchorAt {
+    rest: [f32; 3],
+    along: f32,
+    normal: [f32; 3],
+    across: f32,
+    in_fluid: f32,
+    open_mm2: f32,
+    unused: [f32; 2],
+}
+
+impl AnchorAt {
+    /// Of every node, by place.
+    fn of(body: &Body, layout: &Layout) -> Vec<Self> {
+        let anchors = anchors_by_place(body, layout);
+        let of = |(place, &node): (usize, &u32)| {
+            let anchor = anchors.get(place).copied().unwrap_or_default();
+            Self {
+                rest: body.mesh.positions[node as usize].to_array(),
+                along: anchor.along,
+                normal: anchor.normal.to_array(),
+                across: anchor.across,
+                in_fluid: anchor.in_fluid,
+                open_mm2: anchor.open_mm2,
+                unused: [0.0; 2],
+            }
+        };
+        layout.node_at.iter().enumerate().map(of).collect()
+    }
 }
 
 /// Buffers that several passes share.
@@ -38,6 +76,8 @@ pub(crate) struct DeviceState {
     /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of
     /// the largest growth of ω².
     pub noticed: Buffer<[u32; 4]>,
+    /// By place, as `fluid.wgsl` declares it.
+    pub anchors: Buffer<AnchorAt>,
     /// 1/m by place on this side.
     pub inverse_mass: Vec<f32>,
     weight: Vec<f32>,
@@ -55,6 +95,7 @@ impl DeviceState {
             v: Buffer::zeroed(gpu, "v", nodes.len())?,
             noticed: Buffer::zeroed(gpu, "noticed", nodes.len())?,
             nodes: Buffer::from_slice(gpu, "nodes", &nodes)?,
+            anchors: Buffer::from_slice(gpu, "anchors", &AnchorAt::of(body, layout))?,
             inverse_mass,
             weight,
         })

@@ -7,7 +7,7 @@
 //!
 //! # Practice
 //! 80 bytes read in a row and 64 bytes scattered a tetrahedron and step, besides the displacements
-//! of four nodes; 96 more read and written for a memory of past stress, 16 more for averaged nodal
+//! of four nodes; 144 more read and written for a memory of past stress, 16 more for averaged nodal
 //! pressure. What a body does not need is compiled out of its kernels.
 
 use crate::block::omega2_over_stiffness;
@@ -16,7 +16,8 @@ use crate::gpu::device_state::DeviceState;
 use crate::gpu::groups;
 use crate::gpu::pass::Pass;
 use crate::gpu::topology::Topology;
-use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
+use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, Stiffening};
+use crate::relaxation::PRONY_TERMS;
 use crate::scaling::Scaling;
 use trepan_gpu::Slot::{Storage, StorageMut, Uniform};
 use trepan_gpu::{Buffer, Gpu, GpuError};
@@ -50,7 +51,7 @@ impl Forces {
         let wants_more = more.iter().any(|c| *c != [0.0; 4]);
         let more = Buffer::from_slice(gpu, "more", if wants_more { &more } else { &[[0.0; 4]] })?;
         let relaxes = !config.relaxation.is_none();
-        let memory = Buffer::<f32>::zeroed(gpu, "memory", if relaxes { 12 * count } else { 1 })?;
+        let memory = Buffer::<f32>::zeroed(gpu, "memory", if relaxes { 6 * PRONY_TERMS * count } else { 1 })?;
         let slots = Buffer::zeroed(gpu, "forces", 4 * count)?;
         let (mut laws, mut first) = (Vec::new(), 0u32);
         for tets in layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b)) {
@@ -87,6 +88,7 @@ fn constants(body: &Body, scaling: &Scaling, tet: u32) -> ([f32; 5], f32) {
         Law::StVenantKirchhoff { .. } => constants_of::<StVenantKirchhoff, 2>(body, scaling, tet),
         Law::MooneyRivlin { .. } => constants_of::<MooneyRivlin, 3>(body, scaling, tet),
         Law::Ogden { .. } => constants_of::<Ogden, 5>(body, scaling, tet),
+        Law::Stiffening(_) => constants_of::<Stiffening, 4>(body, scaling, tet),
     }
 }
 

@@ -54,6 +54,7 @@ use crate::base::{Base, left_of};
 use crate::config::Config;
 use crate::node_groups::NodeGroups;
 use crate::nodes::{keep_and_gain, kick_ms};
+use crate::relaxation::Fade;
 use device_state::{DeviceState, Step};
 use forces::Forces;
 use pass::Pass;
@@ -194,9 +195,10 @@ impl GpuTled {
         }
         let first = u32::from(self.base.elapsed_ms != dt_ms).min(count);
         for (elapsed_ms, count) in [(self.base.elapsed_ms, first), (dt_ms, count - first)] {
-            let [one, two] = self.base.config.relaxation.fade(elapsed_ms);
+            let fade = self.base.config.relaxation.fade(elapsed_ms);
+            let of_terms = |of: fn(&Fade) -> f32| std::array::from_fn(|term| fade.get(term).map_or(0.0, of));
             [step.keep, step.gain] = keep_and_gain(self.base.damping_per_ms, kick_ms(elapsed_ms, dt_ms));
-            (step.fade_keep, step.fade_gain) = ([one.keep, two.keep], [one.gain, two.gain]);
+            (step.fade_keep, step.fade_gain) = (of_terms(|fade| fade.keep), of_terms(|fade| fade.gain));
             self.state.step.write(&self.gpu, 0, &[step]);
             self.run(count, presses);
         }
@@ -232,6 +234,10 @@ impl GpuTled {
         let Base { config, layout, max_displacement_mm, .. } = &self.base;
         Step {
             gravity: (loads.gravity - config.balanced_gravity).to_array(),
+            opening_mpa: loads.fluid.opening_mpa,
+            up: loads.fluid.up.to_array(),
+            level_mm: loads.fluid.level_mm,
+            weight: loads.fluid.weight.to_array(),
             dt: dt_ms,
             max_speed: config.max_speed,
             max_displacement: *max_displacement_mm,

@@ -40,7 +40,7 @@ pub(crate) struct Spring {
     damping: f32,
     rest_depth: f32,
     tool_velocity: f32,
-    compliance: f32,
+    unused: f32,
     lateral_velocity: [f32; 3],
     lateral_damping: f32,
     first: u32,
@@ -65,11 +65,9 @@ impl List {
     /// are left out.
     pub fn add(&mut self, spring: &NodalContact, rest_depth: f32, place_of: &[u32], state: &DeviceState) {
         let first = self.touched.len();
-        let mut compliance = 0.0;
         for (n, w) in spring.nodes() {
             let Some(&place) = place_of.get(n as usize) else { continue };
             let [inverse_mass, weight] = state.mass_of(place);
-            compliance += w * w * inverse_mass;
             self.touched.push([place, w.to_bits(), inverse_mass.to_bits(), weight.to_bits()]);
         }
         self.springs.push(Spring {
@@ -78,7 +76,7 @@ impl List {
             damping: spring.damping,
             rest_depth,
             tool_velocity: spring.tool_normal_velocity,
-            compliance,
+            unused: 0.0,
             lateral_velocity: spring.lateral_velocity.to_array(),
             lateral_damping: spring.lateral_damping,
             first: first as u32,
@@ -101,7 +99,6 @@ impl List {
             rest_depth,
             first,
             count: 1,
-            compliance: inverse_mass,
             ..Spring::default()
         });
         true
@@ -126,6 +123,7 @@ impl Press {
             (Storage, (&forces.slots).into()),
             (StorageMut, (&pushed).into()),
             (StorageMut, (&pressure).into()),
+            (Storage, (&state.anchors).into()),
         ];
         let pass = Pass::new(gpu, "press", TLED_PRESS, &bound, 1)?;
         let springs_of = Vec::with_capacity(MAX_SPRINGS + MAX_PLANES);

@@ -29,6 +29,7 @@ pub(crate) fn pass(
         (StorageMut, (&state.u).into()),
         (StorageMut, (&state.v).into()),
         (StorageMut, (&state.noticed).into()),
+        (Storage, (&state.anchors).into()),
     ];
     Pass::new(gpu, "update", TLED_UPDATE, &bound, state.u.len())
 }

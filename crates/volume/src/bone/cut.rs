@@ -37,7 +37,7 @@ const NODE_MM: f32 = 0.5;
 const BRICK_NODES: usize = BRICK * BRICK * BRICK;
 /// Most bricks: 64 MB. At a third of a millimetre they hold 1,240 cm³ of bone.
 const MOST_BRICKS: usize = 1 << 16;
-/// Steepness with which a cut lowers the densities of voxels, HU a voxel.
+/// A numerical parameter: steepness with which a cut lowers the densities of voxels, HU a voxel.
 const RAMP_HU: f32 = 1000.0;
 
 /// The cut beside a volume.

@@ -41,7 +41,7 @@ use glam::{DVec3, IVec3};
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicU64, Ordering};
 use trepan_geometry::{Aabb, Vec3};
 
-/// Density of air, HU: used outside the grid and for removed bone.
+/// Density of air, HU, by definition: used outside the grid and for removed bone.
 pub const AIR_HU: i16 = -1000;
 
 /// The number of the next volume.

@@ -10,7 +10,7 @@ use crate::component::Components;
 use crate::{Sample, VoxelVolume};
 use std::collections::HashMap;
 
-/// Smallest fraction of the border that counts as padding.
+/// A numerical parameter: smallest fraction of the border that counts as padding.
 const LEAST_SHARE: f64 = 0.05;
 
 /// Padding flag of each voxel, one bit each.

@@ -34,7 +34,7 @@ const GAP_MM: [f32; 2] = [0.0, 8.0];
 const BEST_MM: [f32; 2] = [6.0, 2.0];
 /// Largest thickness of the vault if there is no brain to limit the search, mm.
 const WALL_MM: f32 = 30.0;
-/// Density below which there is air, HU.
+/// A numerical parameter: density below which there is air, HU.
 const AIR_BELOW_HU: f32 = -300.0;
 /// Search range of a line before and after its neighbour's entry, mm.
 const AROUND_MM: f32 = 10.0;

@@ -46,7 +46,7 @@ fn case() -> Case {
     Case {
         name: "plate".into(),
         skull: Some(skull),
-        isovalue_hu: 400,
+        isovalue_hu: 400, // numerical
         brain: Some(brain),
         opening: Some(opening),
         ..Case::default()

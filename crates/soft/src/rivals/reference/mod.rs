@@ -23,16 +23,15 @@
 //! one that dynamics would reach.
 
 mod cells;
-mod rank_one;
 
 use crate::bound::dot;
 use crate::factor::Factor;
 use crate::method::Descriptor;
 use crate::rivals::nodes::{depth_mm, known};
+use crate::tangent::RankOne;
 use crate::{Body, BodyError, Law, Loads, Material, NodeState, SoftSolver, StepReport, SurfacePressure};
 use cells::{Cell, Cells};
 use glam::{DMat3, DVec3};
-use rank_one::RankOne;
 
 pub use cells::Order;
 

@@ -9,6 +9,7 @@ mod brain;
 mod comparison;
 mod drilling;
 mod judgement;
+mod living;
 mod phantoms;
 mod shift;
 
@@ -18,5 +19,8 @@ use super::{Part, Scope};
 
 /// Lists the parts.
 pub fn parts(scope: Scope) -> Vec<Part> {
-    [brain::parts, drilling::parts, shift::parts, phantoms::parts].into_iter().flat_map(|parts| parts(scope)).collect()
+    [brain::parts, living::parts, drilling::parts, shift::parts, phantoms::parts]
+        .into_iter()
+        .flat_map(|parts| parts(scope))
+        .collect()
 }

@@ -67,6 +67,7 @@ fn solver(brain: &RestBrain, material_of_tet: Vec<u8>) -> Result<SolverStage> {
         fixed: brain.fixed.clone(),
         materials: TissueClass::ALL.map(|class| class.material(BRAIN_MPA)).to_vec(),
         material_of_tet,
+        anchors: Vec::new(),
     };
     Ok(SolverStage::new(Box::new(trepan_tled::Tled::new(&body, &trepan_tled::Config::default())?)))
 }
@@ -106,11 +107,11 @@ fn sinking(brain: &RestBrain, entry: Vec3, inward: Vec3, lost: f32) -> Result<Ro
     let mut settling = Settling::new(lost, Vec3::NEG_Y, -inward);
     let near = |n: &usize| brain.mesh.positions[*n].distance_squared(entry);
     let node = (0..brain.mesh.positions.len()).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or(0);
-    let (mut seq, mut places) = (0, Vec::new());
+    let (mut seq, mut places, mut loads) = (0, Vec::new(), Loads::default());
     while solver.time_ms() < SINKING_MS {
-        let gravity = settling.at(Phase::Brain, solver.time_ms());
+        settling.load(Phase::Brain, solver.time_ms(), &mut loads);
         seq += 1;
-        solver.step(&Loads { gravity, ..Loads::default() }, seq);
+        solver.step(&loads, seq);
         if solver.time_ms() > 0.5 * SINKING_MS {
             solver.publish(&mut frame);
             places.push(frame.positions[node] - brain.mesh.positions[node]);

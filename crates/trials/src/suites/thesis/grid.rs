@@ -135,7 +135,7 @@ impl Side {
                 damping: DAMPER,
             });
         }
-        Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, contacts }
+        Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, contacts, ..Loads::default() }
     }
 }
 

@@ -127,5 +127,14 @@ pub fn kirchhoff(material: Material, stretch: [f64; 3]) -> [f64; 3] {
             };
             [0, 1, 2].map(|i| (0..2).filter(|&p| shear_mpa[p] != 0.0).map(|p| part(p, i)).sum::<f64>() + bulk)
         }
+        Material::Stiffening { share, bound, .. } => {
+            let (share, bound) = (f64::from(share), f64::from(bound));
+            let power = squares.map(|s| (j.powf(2.0 / 3.0) / s).powi(17));
+            let sum: f64 = power.iter().sum();
+            let v = 1.0 + bound * (sum - 3.0);
+            let term = (1.0 - share) * mu / 34.0 * v.powf(1.0 / 16.0 - 1.0);
+            let one = first(0.5 * share * mu);
+            [0, 1, 2].map(|i| one[i] + term * (2.0 / 3.0 * sum - 2.0 * power[i]) + bulk)
+        }
     }
 }

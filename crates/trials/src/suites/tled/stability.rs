@@ -282,7 +282,7 @@ fn slivers(findings: &mut Findings) {
 /// neither burst nor swing for ever. At rest it hangs by 12 mm; a start without damping, or half
 /// the stiffness relaxed away, doubles that.
 fn extremes(findings: &mut Findings) {
-    let relaxing = |time_ms| Relaxation { share: [0.5, 0.0], time_ms: [time_ms, 1.0] };
+    let relaxing = |time_ms| Relaxation { share: [0.5, 0.0, 0.0], time_ms: [time_ms, 1.0, 1.0] };
     let damped = |share| Config { damping: Damping::Critical(share), ..Config::default() };
     let settings = [
         ("damping a tenth of critical", damped(0.1), Material::BRAIN),
