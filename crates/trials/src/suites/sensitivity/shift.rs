@@ -62,7 +62,7 @@ fn run(values: &[f64]) -> [f64; OUTPUTS] {
     let config = Config { mass_scaling: f32::INFINITY, ..config(Relaxation::NONE) };
     let mut solver = Tled::new(&body, &config).expect("the stem is held");
     let mut loads = Loads::default();
-    [0.0, DRAINED_MS].map(|time_ms| settling.load(Phase::Brain, time_ms, &mut loads));
+    [0.0, DRAINED_MS].into_iter().for_each(|time_ms| settling.load(Phase::Brain, time_ms, &mut loads));
     loads.fluid.opening_mpa = 0.0;
     solver.settle(&loads, &trepan_tled::Settling::default());
     let sunk = |at: usize, node: usize| f64::from(start[at] - solver.positions()[node].z);
@@ -98,7 +98,7 @@ mod tests {
         let scene = scene();
         let values: Vec<f64> = scene.inputs.iter().map(|input| input.value).collect();
         let mut softer = values.clone();
-        [0, 5, 7].map(|stiffness| softer[stiffness] *= 0.8);
+        [0, 5, 7].into_iter().for_each(|stiffness| softer[stiffness] *= 0.8);
         let (one, two) = ((scene.run)(&values), (scene.run)(&softer));
         assert!(one[0] > one[1] && one[1] > 0.01, "{one:?}");
         for (a, b) in one.iter().zip(two) {
