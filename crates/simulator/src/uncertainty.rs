@@ -132,12 +132,12 @@ mod tests {
     use trepan_contact::NodalContact;
     use trepan_geometry::Vec3;
     use trepan_rigid::removal::{Pressed, RemovalLaw};
-    use trepan_soft::{Body, Loads, SoftSolver, boxes};
+    use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
     use trepan_tled::{Config, Settling, Tled};
 
     /// Force of a block of brain, N, 30 mm wide, on a hand 5 mm past its surface, and how far the
     /// surface gave way, mm.
-    fn pressed(young_mpa: f32) -> [f32; 2] {
+    fn pressed(material: Material) -> [f32; 2] {
         let mesh = boxes::centred_box([4; 3], Vec3::splat(30.0));
         let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
         let mut contact = NodalContact::none();
@@ -148,7 +148,7 @@ mod tests {
         contact.normalise();
         (contact.normal, contact.stiffness, contact.offset_mm) = (Vec3::Z, TISSUE.stiffness, 5.0 - 30.0);
         let config = Config { mass_scaling: f32::INFINITY, averaged_pressure: true, ..Config::default() };
-        let body = Body::uniform(mesh, fixed, TissueClass::Brain.material(young_mpa));
+        let body = Body::uniform(mesh, fixed, material);
         let mut solver = Tled::new(&body, &config).unwrap();
         let settling = Settling { tolerance_mm: 1e-3, ..Settling::default() };
         let settled = solver.settle(&Loads { contacts: contact.into(), ..Loads::default() }, &settling);
@@ -158,11 +158,15 @@ mod tests {
     #[test]
     fn the_band_of_a_press_is_that_of_softer_and_stiffer_tissue() {
         let factor = STIFFNESS.factor() as f32;
-        let [usual, soft, stiff] = [1.0, 1.0 / factor, factor].map(|share| pressed(0.003 * share));
-        let band = Band::of_tissue_force(usual[0], 5.0, 5.0 - usual[1]);
-        assert!(usual[0] > 0.05 && band.low < f64::from(usual[0]), "{usual:?} {band:?}");
-        for (is, truth) in [(band.low, soft[0]), (band.high, stiff[0])] {
-            assert!((is / f64::from(truth) - 1.0).abs() < 0.1, "{is} N, pressed {truth} N");
+        for law in [TissueClass::material, TissueClass::stiffening] {
+            let [usual, soft, stiff] =
+                [1.0, 1.0 / factor, factor].map(|share| pressed(law(TissueClass::Brain, 0.003 * share)));
+            let band = Band::of_tissue_force(usual[0], 5.0, 5.0 - usual[1]);
+            println!("{usual:?} N and mm, {soft:?} softer, {stiff:?} stiffer: {band:?}");
+            assert!(usual[0] > 0.05 && band.low < f64::from(usual[0]), "{usual:?} {band:?}");
+            for (is, truth) in [(band.low, soft[0]), (band.high, stiff[0])] {
+                assert!((is / f64::from(truth) - 1.0).abs() < 0.15, "{is} N, pressed {truth} N");
+            }
         }
     }
 

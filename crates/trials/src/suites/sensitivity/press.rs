@@ -8,11 +8,13 @@
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
-use trepan_measurements::{brain, sensitivity};
+use trepan_measurements::{brain, brain_living, fits, sensitivity};
 use trepan_simulator::{HapticConfig, Program, TissueClass};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 
+/// Megapascals in a kilopascal.
+const MPA_PER_KPA: f32 = 1e-3;
 /// Edge of the block, mm.
 const EDGE_MM: f32 = 30.0;
 /// Cells along an edge.
@@ -25,34 +27,41 @@ const PRESS_MM: f32 = 5.0;
 const GO_MS: f32 = 250.0;
 /// Time at which the last force is taken, ms.
 const END_MS: f32 = 1000.0;
-/// Young's modulus of brain by default, MPa.
-const YOUNG_MPA: f32 = 0.003;
-
 /// The scene with its constants.
 pub fn scene() -> Scene {
-    let material = TissueClass::Brain.material(YOUNG_MPA);
-    let compressible = 0.5 - f64::from(material.poisson());
-    let relaxed = 1.0 - Relaxation::BRAIN.share.iter().map(|share| f64::from(*share)).sum::<f64>();
+    let relaxed = 1.0 - Relaxation::SOLID_AND_FLUID.share.iter().map(|share| f64::from(*share)).sum::<f64>();
     let spring = HapticConfig::usual(Program::Brain).tissue_force.stiffness;
-    let inputs = vec![
-        Input { value: material.shear_mpa(), ..Input::of("shear modulus", sensitivity::SHEAR_MODULUS) },
-        Input { value: compressible, ..Input::of("compressibility", sensitivity::COMPRESSIBILITY) },
-        Input { value: material.density_g_mm3().into(), ..Input::of("density", brain::DENSITY) },
+    let mut inputs = of_brain();
+    inputs.extend([
+        Input::of("stress at hand speed over that of a slow test", fits::HAND_SPEED_FACTOR),
         Input { value: relaxed, ..Input::of("share of stress that stays", sensitivity::RELAXED_SHARE) },
         Input::of("times of relaxation", sensitivity::RELAXATION_TIMES),
         Input { value: spring.into(), ..Input::of("spring of the hand on tissue", sensitivity::TISSUE_COUPLING) },
-    ];
+    ]);
     Scene { name: "press", inputs, outputs: ["greatest force, N", "force after 1 s, N"], run }
 }
 
-/// Brain of a shear modulus, MPa, a compressibility `0.5 - ν` and a density, g/mm³.
-pub fn brain(shear_mpa: f64, compressibility: f64, density: f64) -> Material {
-    let (poisson, density_g_mm3, shear_mpa) = (0.5 - compressibility as f32, density as f32, shear_mpa as f32);
-    match TissueClass::Brain.material(YOUNG_MPA) {
-        Material::Stiffening { share, bound, .. } => {
-            Material::Stiffening { shear_mpa, share, bound, poisson, density_g_mm3 }
-        }
-        _ => Material::NeoHookean { young_mpa: 2.0 * shear_mpa * (1.0 + poisson), poisson, density_g_mm3 },
+/// Constants of brain: those that [`brain`] takes.
+pub fn of_brain() -> Vec<Input> {
+    let usual = TissueClass::Brain.stiffening(MPA_PER_KPA * brain_living::YOUNG_MODULUS.f32());
+    vec![
+        Input { value: usual.shear_mpa(), ..Input::of("shear modulus", sensitivity::SHEAR_MODULUS) },
+        Input { value: 0.5 - f64::from(usual.poisson()), ..Input::of("compressibility", sensitivity::COMPRESSIBILITY) },
+        Input { value: usual.density_g_mm3().into(), ..Input::of("density", brain::DENSITY) },
+        Input::of("share that does not stiffen", fits::BRAIN_SHARE),
+        Input::of("strain of stiffening", fits::BRAIN_BOUND),
+    ]
+}
+
+/// Brain without a region, by the law of `--quality auto`: shear modulus, MPa, compressibility
+/// `0.5 - ν`, density, g/mm³, and the two constants of stiffening.
+pub fn brain([shear, compressibility, density, share, bound]: [f64; 5]) -> Material {
+    Material::Stiffening {
+        shear_mpa: shear as f32,
+        share: share as f32,
+        bound: bound as f32,
+        poisson: 0.5 - compressibility as f32,
+        density_g_mm3: density as f32,
     }
 }
 
@@ -62,8 +71,10 @@ pub fn config(relaxation: Relaxation) -> Config {
 }
 
 fn run(values: &[f64]) -> [f64; OUTPUTS] {
-    let &[shear_mpa, compressibility, density, relaxed, times, spring] = values else { unreachable!() };
-    let usual = Relaxation::BRAIN;
+    let &[shear, compressibility, density, share, bound, at_speed, relaxed, times, spring] = values else {
+        unreachable!()
+    };
+    let usual = Relaxation::SOLID_AND_FLUID;
     let kept: f32 = usual.share.iter().sum();
     let relaxation = Relaxation {
         share: usual.share.map(|share| share * (1.0 - relaxed as f32) / kept),
@@ -73,7 +84,7 @@ fn run(values: &[f64]) -> [f64; OUTPUTS] {
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
     let middle = Vec3::new(0.5, 0.5, 1.0) * EDGE_MM;
     let pressed = boxes::nodes_where(&mesh, |p| p.distance(middle) < TIP_MM && p.z > EDGE_MM - 1e-3);
-    let body = Body::uniform(mesh, fixed, brain(shear_mpa, compressibility, density));
+    let body = Body::uniform(mesh, fixed, brain([at_speed * shear, compressibility, density, share, bound]));
     let mut solver = Tled::new(&body, &config(relaxation)).expect("a block on its base is held");
     let mut contact = NodalContact::none();
     pressed.iter().for_each(|node| contact.add(*node, 1.0));
@@ -104,7 +115,7 @@ mod tests {
         let scene = scene();
         let values: Vec<f64> = scene.inputs.iter().map(|input| input.value).collect();
         let mut twice = values.clone();
-        (twice[0], twice[5]) = (2.0 * values[0], 2.0 * values[5]);
+        (twice[0], twice[8]) = (2.0 * values[0], 2.0 * values[8]);
         let (one, two) = ((scene.run)(&values), (scene.run)(&twice));
         assert!(one[0] > one[1] && one[1] > 0.01, "{one:?}");
         for (a, b) in one.iter().zip(two) {

@@ -6,12 +6,12 @@
 //! midline on bridging veins; above the fluid's level tissue has its weight and the layer is gone.
 //! Outputs at rest: how far the top of the surface sinks, and how far the centre does.
 
-use super::press::{brain, config};
+use super::press::{brain, config, of_brain};
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_geometry::{Vec3, units};
-use trepan_measurements::{brain, sensitivity, support};
+use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_simulator::{Phase, Settling, TissueClass};
+use trepan_simulator::{Phase, Settling};
 use trepan_soft::{Anchor, Body, Loads, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 
@@ -26,23 +26,21 @@ const DRAINED_MS: f64 = 1e9;
 
 /// The scene with its constants.
 pub fn scene() -> Scene {
-    let material = TissueClass::Brain.material(0.003);
-    let compressible = 0.5 - f64::from(material.poisson());
-    let inputs = vec![
-        Input { value: material.shear_mpa(), ..Input::of("shear modulus", sensitivity::SHEAR_MODULUS) },
-        Input { value: compressible, ..Input::of("compressibility", sensitivity::COMPRESSIBILITY) },
-        Input { value: material.density_g_mm3().into(), ..Input::of("density", brain::DENSITY) },
+    let mut inputs = of_brain();
+    inputs.extend([
         Input::of("share of buoyancy that is lost", support::CSF_LOSS),
         Input::of("height of the stem", support::STEM_HEIGHT),
         Input::of("stiffness of the layer around the brain", support::LAYER_MODULUS),
         Input::of("shear of that layer", support::LAYER_SHEAR),
         Input::of("stiffness of bridging veins", support::VEIN_STIFFNESS),
-    ];
+    ]);
     Scene { name: "shift", inputs, outputs: ["sag of the top, mm", "sag of the centre, mm"], run }
 }
 
 fn run(values: &[f64]) -> [f64; OUTPUTS] {
-    let &[shear_mpa, compressibility, density, lost, stem, layer, layer_shear, veins] = values else { unreachable!() };
+    let &[shear, compressibility, density, share, bound, lost, stem, layer, layer_shear, veins] = values else {
+        unreachable!()
+    };
     let mut mesh = boxes::centred_box([CELLS; 3], Vec3::splat(2.0));
     for p in &mut mesh.positions {
         let from = *p - 1.0;
@@ -58,7 +56,7 @@ fn run(values: &[f64]) -> [f64; OUTPUTS] {
     let start = [top, centre].map(|node| mesh.positions[node].z);
     let mut settling = Settling::draining(&mesh, Vec3::Z, lost as f32, 1.0);
     let anchors = anchors(&mesh, [layer, layer_shear, veins]);
-    let body = Body { anchors, ..Body::uniform(mesh, fixed, brain(shear_mpa, compressibility, density)) };
+    let body = Body { anchors, ..Body::uniform(mesh, fixed, brain([shear, compressibility, density, share, bound])) };
     let config = Config { mass_scaling: f32::INFINITY, ..config(Relaxation::NONE) };
     let mut solver = Tled::new(&body, &config).expect("the stem is held");
     let mut loads = Loads::default();
@@ -98,7 +96,7 @@ mod tests {
         let scene = scene();
         let values: Vec<f64> = scene.inputs.iter().map(|input| input.value).collect();
         let mut softer = values.clone();
-        [0, 5, 7].into_iter().for_each(|stiffness| softer[stiffness] *= 0.8);
+        [0, 7, 9].into_iter().for_each(|stiffness| softer[stiffness] *= 0.8);
         let (one, two) = ((scene.run)(&values), (scene.run)(&softer));
         assert!(one[0] > one[1] && one[1] > 0.01, "{one:?}");
         for (a, b) in one.iter().zip(two) {
