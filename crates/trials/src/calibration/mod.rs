@@ -145,7 +145,8 @@ pub fn run(root: &Path, out: &Path, write: bool) -> Result<()> {
     println!("{}", report());
     std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
     for (name, series) in Region::ALL.iter().flat_map(|region| Mode::ALL.map(|mode| drawn(*region, mode))) {
-        whole(&out.join(format!("{name}.svg")), curve::svg(&series)?.as_bytes())?;
+        let drawing = curve::svg(&series).map_err(|fault| anyhow::anyhow!("{name}: {fault}"))?;
+        whole(&out.join(format!("{name}.svg")), drawing.as_bytes())?;
     }
     println!("curves over data: {}", out.display());
     let text = table(&rows());
@@ -170,7 +171,7 @@ fn report() -> String {
                 let [tension, compression, shear] = Mode::ALL.map(|mode| 100.0 * fit.error(mode));
                 let stable = if fit.law.is_stable() { "yes" } else { "no" };
                 let parameters = fit.minimum.at.iter().zip(&fit.minimum.errors);
-                let parameters: Vec<String> = parameters.map(|(at, error)| format!("{at:.4}±{error:.1}")).collect();
+                let parameters: Vec<String> = parameters.map(|(at, error)| format!("{at:.4}±{error:.4}")).collect();
                 let _ = writeln!(
                     text,
                     "{:16} {:17} {name:20} {tension:6.1}%{compression:7.1}%{shear:6.1}%  {stable:6}  {}",
@@ -189,7 +190,7 @@ pub fn drawn(region: Region, mode: Mode) -> (String, Series) {
     let curve = region.curve(mode);
     let (first, last) = (curve[0].0, curve[curve.len() - 1].0);
     let places: Vec<f64> = (0..=40).map(|i| first + (last - first) * f64::from(i) / 40.0).collect();
-    let of_law = |law| places.iter().map(|&at| (at, mode.stress(law, at))).collect::<Vec<_>>();
+    let of_law = |law: trepan_soft::Law| places.iter().map(|&at| (at, mode.stress(&law, at))).collect::<Vec<_>>();
     let (data, is_measured) = (region.rows(mode), region.rows(mode).is_some());
     let mut lines = vec![(if is_measured { "measured" } else { "published Ogden fit" }.to_string(), curve)];
     for sign in [-1.0, 1.0] {
@@ -200,7 +201,7 @@ pub fn drawn(region: Region, mode: Mode) -> (String, Series) {
         }
     }
     for form in [Form::Stiffening, Form::OneTermOgden, Form::NeoHookean] {
-        lines.push((form.name().into(), of_law(&Fit::of(region, form, PULLED).law)));
+        lines.push((form.name().into(), of_law(Fit::of(region, form, PULLED).law)));
     }
     let how = if mode == Mode::Shear { "predicted from tension and compression" } else { "fitted" };
     let title = format!("{} in {}, laws {how}", region.name().replace('-', " "), mode.name());
