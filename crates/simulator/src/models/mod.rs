@@ -243,7 +243,8 @@ impl ModelRequest {
             probe_radius_mm,
             finest_mm: facts.ct_voxel_mm.unwrap_or(usual.finest_mm),
             brain_mm3: facts.brain_mm3.unwrap_or(usual.brain_mm3),
-            material: TissueClass::Brain.material(self.young_mpa),
+            material: TissueClass::Brain
+                .material(self.young_mpa * self.given.ingredients.relaxation.hand_speed_factor()),
             device_rate_hz: self.rate_hz.into(),
             picture_pixels: self.picture.map_or(usual.picture_pixels, view_pixels),
             view_mm: VIEW_MM,

@@ -171,7 +171,7 @@ fn report() -> String {
                 let [tension, compression, shear] = Mode::ALL.map(|mode| 100.0 * fit.error(mode));
                 let stable = if fit.law.is_stable() { "yes" } else { "no" };
                 let parameters = fit.minimum.at.iter().zip(&fit.minimum.errors);
-                let parameters: Vec<String> = parameters.map(|(at, error)| format!("{at:.4}±{error:.1}")).collect();
+                let parameters: Vec<String> = parameters.map(|(at, error)| format!("{at:.4}±{error:.4}")).collect();
                 let _ = writeln!(
                     text,
                     "{:16} {:17} {name:20} {tension:6.1}%{compression:7.1}%{shear:6.1}%  {stable:6}  {}",

@@ -53,7 +53,9 @@ fn regions(findings: &mut Findings) {
             findings.rows.push(at_point(end, mode, how, mode.stress(&law, end.at)).why(why).row());
             if mode == Mode::Shear {
                 let middle = &rows[rows.len() / 2 - 1];
-                findings.rows.push(at_point(middle, mode, how, mode.stress(&law, middle.at)).row());
+                let why = "tension and compression begin stiffer than shear does: published fits to shear alone are softer too, \
+                           0.54 against 0.66 kPa in the corona radiata";
+                findings.rows.push(at_point(middle, mode, how, mode.stress(&law, middle.at)).why(why).row());
             }
         }
         let (ours, published) = (law.moduli().0, region.published()[0]);
