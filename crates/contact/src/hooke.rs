@@ -22,7 +22,7 @@ pub struct Hooke {
 impl Default for Hooke {
     /// The thesis's bone: 2 N/mm.
     fn default() -> Self {
-        Self { stiffness: 2.0 }
+        Self { stiffness: trepan_measurements::drilling::CONTACT_STIFFNESS.f32() }
     }
 }
 

@@ -23,7 +23,7 @@
 
 use crate::{ContactManifold, ForceModel};
 use trepan_geometry::{ToolState, Wrench};
-use trepan_measurements::drilling;
+use trepan_measurements::{drilling, hands};
 
 /// `F = k p n - b vₙ n`, never pulling.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ impl Viscoelastic {
         Self { stiffness: drilling::CONTACT_STIFFNESS.f32(), damping: drilling::CONTACT_DAMPING.f32() };
 
     /// Brain: the thesis's 0.3 N/mm, lightly damped.
-    pub const BRAIN: Self = Self { stiffness: 0.3, damping: 0.2 };
+    pub const BRAIN: Self = Self { stiffness: hands::TISSUE_STIFFNESS.f32(), damping: hands::TISSUE_DAMPING.f32() };
 }
 
 impl Default for Viscoelastic {

@@ -5,7 +5,7 @@ use trepan_contact::{GuardConfig, GuardedWrench, PassivityConfig, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3};
 
 /// Damping of a light grip, N ms/mm.
-const LIGHT_GRIP: f32 = 2.0;
+const LIGHT_GRIP: f32 = trepan_measurements::grip::LIGHT_GRIP_DAMPING.f32();
 
 /// A haptic device, or something that behaves like one.
 pub trait HapticDevice: Send {

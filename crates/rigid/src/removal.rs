@@ -56,7 +56,7 @@
 
 use crate::spindle::{Spindle, per_ms};
 use trepan_geometry::{Tool, ToolKind};
-use trepan_measurements::{drilling, hands, skull};
+use trepan_measurements::{devices, drilling, hands, skull};
 use trepan_volume::AIR_HU;
 
 /// Density at which the specific energy is given, HU: dense cortical bone.
@@ -70,7 +70,7 @@ const UM: f32 = 1e-3;
 
 /// Newtons at the hand per newton of the task, of a hand that no device limits: the greatest
 /// published force on a drill becomes the Touch's peak.
-pub const FORCE_SCALE: f32 = hands::DEVICE_PEAK_FORCE.f32() / hands::DRILLING_PEAK_GREATEST.f32();
+pub const FORCE_SCALE: f32 = devices::TOUCH_PEAK_FORCE.f32() / hands::DRILLING_PEAK_GREATEST.f32();
 
 /// A cutter and its motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,7 +178,8 @@ pub enum RemovalLaw {
         cancellous_share: f32,
         /// Stiffness that turns depth into load, newtons of the task per mm.
         stiffness: f32,
-        /// Load beyond which pressing harder does not count, newtons of the task.
+        /// Load beyond which pressing harder cuts no faster, newtons of the task; it still slows the
+        /// spindle.
         max_load_n: f32,
     },
 }
@@ -250,9 +251,10 @@ impl RemovalLaw {
             return (0.0, 0.0);
         };
         let &Pressed { radius_mm, depth_mm, cosine, dt_ms } = pressed;
-        let tangential_n = cutter.cutting_ratio * (stiffness * depth_mm).min(max_load_n);
+        let load_n = stiffness * depth_mm;
+        let tangential_n = cutter.cutting_ratio * load_n.min(max_load_n);
         let arm_mm = radius_mm * cutter.arm(cosine);
-        let rpm = cutter.spindle.turn(tangential_n * arm_mm, stalled);
+        let rpm = cutter.spindle.turn(cutter.cutting_ratio * load_n * arm_mm, stalled);
         let cuts_n = (tangential_n - cutter.edge_n(radius_mm)).max(0.0);
         let volume = cuts_n * arm_mm * per_ms(rpm) / cutter.chip_energy_mpa * dt_ms;
         (if volume.is_finite() { volume.max(0.0) } else { 0.0 }, rpm)

@@ -34,11 +34,11 @@ pub struct Tangent {
     laws: Vec<Law>,
     /// Node groups over which pressure is averaged; empty where it is not.
     groups: Vec<Group>,
+    anchors: Vec<Anchor>,
     rest: Vec<DVec3>,
     fixed: Vec<bool>,
     factor: Factor,
     springs: Vec<RankOne>,
-    anchors: Vec<Anchor>,
     /// Stiffness of an element of mean size, N/mm.
     element_stiffness: f64,
 }
@@ -77,12 +77,21 @@ impl Tangent {
         let mean_mm = (body.mesh.total_mm3() / elements.len() as f64).cbrt();
         let element_stiffness = laws.iter().map(|law| law.moduli().0).fold(0.0, f64::max) * mean_mm;
         let rest = body.mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-        let (springs, anchors) = (Vec::new(), body.anchors.clone());
-        Some(Self { elements, laws, groups, rest, fixed, factor, springs, anchors, element_stiffness })
+        Some(Self {
+            elements,
+            laws,
+            groups,
+            anchors: body.anchors.clone(),
+            rest,
+            fixed,
+            factor,
+            springs: Vec::new(),
+            element_stiffness,
+        })
     }
 
-    /// Assembles and factors the tangent at displacements `u`, mm, with the springs that press and the
-    /// anchors that hold now. False when no shift made it positive definite.
+    /// Assembles and factors the tangent at displacements `u`, mm, with the anchors that hold and the
+    /// springs that press there. False when no shift made it positive definite.
     pub fn factor(&mut self, u: &[DVec3], loads: &Loads) -> bool {
         let depth_mm = |contact: &NodalContact| -> f64 {
             let along = |(n, w): (usize, f64)| w * (self.rest[n] + u[n]).dot(contact.normal.as_dvec3());
@@ -92,8 +101,8 @@ impl Tangent {
         let pressing: Vec<NodalContact> = loads.contacts.all().filter(presses).collect();
         let mut shift = 0.0;
         for _ in 0..SHIFTS {
-            self.assemble(u, &pressing);
-            self.add_anchors(u, loads);
+            self.assemble(u);
+            self.add_nodal(u, loads, &pressing);
             self.factor.add_diagonal(|_| shift);
             if self.factor.factor() {
                 self.take_in(&pressing);
@@ -116,7 +125,7 @@ impl Tangent {
         self.elements.iter().map(gradient).fold(0.0, f64::max).sqrt()
     }
 
-    fn assemble(&mut self, u: &[DVec3], pressing: &[NodalContact]) {
+    fn assemble(&mut self, u: &[DVec3]) {
         self.factor.clear();
         let pressures = self.add_groups(u);
         for (t, Element { corners, shape, material }) in self.elements.iter().enumerate() {
@@ -136,7 +145,6 @@ impl Tangent {
                 }
             }
         }
-        self.add_planes(pressing);
     }
 
     /// Adds the terms of node groups; gives the pressure of every element, MPa.
@@ -168,25 +176,23 @@ impl Tangent {
         pressures
     }
 
-    /// Adds springs of one node, such as planes.
-    fn add_planes(&mut self, pressing: &[NodalContact]) {
+    /// Adds anchors and springs of one node, such as planes.
+    fn add_nodal(&mut self, u: &[DVec3], loads: &Loads, pressing: &[NodalContact]) {
+        for &Anchor { node, normal, along, across, in_fluid, .. } in &self.anchors {
+            let place = self.rest[node as usize] + u[node as usize];
+            let held = 1.0 - f64::from(in_fluid * loads.fluid.dryness(place.as_vec3()));
+            let (normal, across) = (normal.as_dvec3(), f64::from(across));
+            let more = normal * (f64::from(along) - across);
+            let stiffness = DMat3::from_diagonal(DVec3::splat(across))
+                + DMat3::from_cols(more * normal.x, more * normal.y, more * normal.z);
+            self.factor.add(node, node, stiffness * held);
+        }
         for contact in pressing.iter().filter(|contact| is_single(contact)) {
             let (normal, stiffness) = (contact.normal.as_dvec3(), f64::from(contact.stiffness));
             for (n, w) in known(contact, self.fixed.len()) {
                 let (block, n) = (normal * (stiffness * w * w), n as u32);
                 self.factor.add(n, n, DMat3::from_cols(block * normal.x, block * normal.y, block * normal.z));
             }
-        }
-    }
-
-    fn add_anchors(&mut self, u: &[DVec3], loads: &Loads) {
-        for anchor in &self.anchors {
-            let at = (self.rest[anchor.node as usize] + u[anchor.node as usize]).as_vec3();
-            let held = f64::from(1.0 - anchor.in_fluid * loads.fluid.dryness(at));
-            let (n, along, across) = (anchor.normal.as_dvec3(), f64::from(anchor.along), f64::from(anchor.across));
-            let block = DMat3::from_cols(n * n.x, n * n.y, n * n.z) * (along - across);
-            let block = block + DMat3::from_diagonal(DVec3::splat(across));
-            self.factor.add(anchor.node, anchor.node, block * held);
         }
     }
 
@@ -283,10 +289,10 @@ mod tests {
     fn averaged_pressure_softens_all_but_an_even_change_of_volume() {
         let body = Body { fixed: vec![0], ..block() };
         let even: Vec<DVec3> = body.mesh.positions.iter().map(|p| p.as_dvec3() * 1e-3).collect();
-        let uneven: Vec<DVec3> = even.iter().zip(noise(&body)).map(|(e, n)| *e + n * 1e-3).collect();
+        let uneven = noise(&body);
         let energy = |averaged: bool, u: &[DVec3]| {
             let mut tangent = Tangent::of(&body, averaged).unwrap();
-            tangent.assemble(&vec![DVec3::ZERO; u.len()], &[]);
+            tangent.assemble(&vec![DVec3::ZERO; u.len()]);
             tangent.factor.work(u)
         };
         let (plain, averaged) = (energy(false, &even), energy(true, &even));

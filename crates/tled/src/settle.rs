@@ -1,12 +1,12 @@
 //! Equilibrium under given loads, e.g. sag or brain shift, by Newton's method on TLED's own forces.
 //!
 //! # Theory
-//! The residual r is the force on the free nodes: elements, weight, anchors, contact springs,
-//! pressure. A step is `d = B r`. B starts from the factored tangent of the same laws on plain
-//! elements ([`Tangent`]) and is corrected by the last changes of displacement and residual
-//! (limited-memory BFGS: Nocedal 1980). So what the tangent leaves out is learnt: averaged pressure,
-//! relaxed stress, pressure that follows the surface. A line search on `r·d` shortens a step after
-//! which the residual points back.
+//! The residual r is the force on the free nodes: elements, weight, contact springs, pressure. A
+//! step is `d = B r`. B starts from the factored tangent of the same laws on plain elements
+//! ([`Tangent`]) and is corrected by the last changes of displacement and residual (limited-memory
+//! BFGS: Nocedal 1980). So what the tangent leaves out is learnt: averaged pressure, relaxed stress,
+//! pressure that follows the surface. A line search on `r·d` shortens a step after which the
+//! residual points back.
 //!
 //! Near rest d is the way that is left. If steps shrink by the factor ρ, `|d|/(1 - ρ)` bounds it.
 //! Where rounding of the f32 forces keeps d from shrinking, the way left is the largest d of the
@@ -108,7 +108,9 @@ impl Tled {
         let mut settled = Settled { left_mm: f32::INFINITY, ..Settled::default() };
         let is_exact = !self.base.config.averaged_pressure || self.locks();
         let averaged = self.base.config.averaged_pressure && is_exact;
-        let tangent = self.base.supported.then(|| Tangent::of(&self.body, averaged)).flatten();
+        let is_held =
+            self.base.supported || self.body.anchors.iter().any(|anchor| anchor.along.min(anchor.across) > 0.0);
+        let tangent = is_held.then(|| Tangent::of(&self.body, averaged)).flatten();
         let Some(mut tangent) = tangent else { return settled };
         let mut changes = VecDeque::with_capacity(MEMORY + 1);
         let mut at = self.evaluate(self.displacements(), loads, &mut settled);
@@ -211,9 +213,9 @@ impl Tled {
         let (place_of, elements) = (&self.base.layout.place_of, &self.elements);
         let nodes = elements.nodes();
         let gravity = loads.gravity - self.base.config.balanced_gravity;
-        let outside = |place| nodes.weight(place, gravity, &loads.fluid) + nodes.anchor_force(place, &loads.fluid);
-        let mut residual: Vec<DVec3> =
-            places().map(|place| (elements.force(place) + outside(place)).as_dvec3()).collect();
+        let mut residual: Vec<DVec3> = places()
+            .map(|place| (elements.force(place) + nodes.force_at_rest(place, gravity, &loads.fluid)).as_dvec3())
+            .collect();
         let free = |n: u32| {
             let place = place_of[n as usize] as usize;
             FreeNode { position: nodes.position(place), velocity: Vec3::ZERO, inverse_mass: nodes.inverse_mass[place] }

@@ -34,6 +34,7 @@ pub const TABLE: &[Wrong] = &[
     ("a negative displacement", "--displacement-mm -1", &["--displacement-mm", "0.0001 to 100"]),
     ("a picture error that is no number", "--picture-error-percent nan", &["--picture-error-percent", "0.001 to 100"]),
     ("a motion that is not scaled", "--device-scale 0", &["--device-scale 0", "0.2 to 5"]),
+    ("a force that is not scaled", "--force-scale 0", &["--force-scale 0", "0.01 to 1"]),
     ("an unknown quality", "--quality best", &["best", "auto, draft, usual, fine"]),
     ("an unknown method for bone", "--rigid magic", &["magic", "thesis"]),
     ("an unknown solver", "--solver magic", &["magic", "tled"]),

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_voxels_and_more_pixels_have_smaller_errors() {
+    fn bone_has_small_errors_and_more_pixels_have_smaller_ones() {
         let scene = Scene { picture_pixels: [160, 120], view_mm: 80.0, ..Scene::default() };
         let mut rows = Rows::stored().unwrap();
         // Voxels of 2 mm are neither more accurate nor cheaper than others here.
@@ -293,7 +293,8 @@ mod tests {
         assert_eq!(own.has(), Parts { bone: true, tissue: false, picture: true });
         let found = own.instead(rows.clone(), &scene);
         let errors: Vec<f64> = found.bone.iter().map(|row| row.error.at_most(&scene.bone_features())).collect();
-        assert!(errors.len() == 2 && errors[0] < 0.6 * errors[1], "{errors:?}");
+        // Cutting in steps of 5 um is a hundredth of a newton in any voxels.
+        assert!(errors.len() == 2 && errors.iter().all(|n| *n < 0.03), "{errors:?}");
         let errors: Vec<f64> = found.picture.iter().map(|row| row.error.at_most(&scene.picture_features())).collect();
         assert!(errors[0] > 1.2 * errors[1] && errors[2] == 0.0, "{errors:?}");
         assert_eq!(found.tissue, rows.tissue);
@@ -316,7 +317,7 @@ mod tests {
         let before = errors(&stretch);
         let stretch = stretch.cutting();
         let cut = errors(&stretch);
-        assert!(cut[0] < 0.7 * cut[1] && cut[1] < 3.0, "{cut:?}");
+        assert!(cut[0] < cut[1] && cut[1] < 0.03, "{cut:?}");
         assert!(cut.iter().zip(&before).all(|(cut, before)| cut >= before), "{cut:?} {before:?}");
         assert_eq!(errors(&stretch), cut, "the cut was not restored");
     }

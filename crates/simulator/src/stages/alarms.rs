@@ -13,10 +13,10 @@ use crate::stages::drill::{BREAK_MM, THIN_MM};
 use crate::stages::notice::Warning;
 use crate::stages::score::cuts_into_brain;
 use trepan_link::wire::TickRecord;
-use trepan_measurements::grip;
+use trepan_measurements::{grip, hands};
 
 /// Time until breakthrough under which a warning is raised, ms.
-const SOON_MS: f32 = 300.0;
+const SOON_MS: f32 = hands::WARNING_SOON.f32();
 /// Time constant of the smoothing of the feed rate, ms.
 const SMOOTH_MS: f32 = 50.0;
 
@@ -86,7 +86,11 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { near_mm: 2.0, brain_force_n: grip::BRAIN_FORCE_WARNING.f32(), forbidden_mm: 1.0 }
+        Self {
+            near_mm: hands::WARNING_NEAR.f32(),
+            brain_force_n: grip::BRAIN_FORCE_WARNING.f32(),
+            forbidden_mm: hands::WARNING_FORBIDDEN.f32(),
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::ingredients::Ingredients;
 use crate::program::Program;
 use crate::stages::alarms::Limits;
 use trepan_contact::{ForceShading, Friction, GuardConfig, Vibration, Viscoelastic};
-use trepan_measurements::drilling;
+use trepan_measurements::{drilling, hands};
 use trepan_rigid::{Method, removal::FORCE_SCALE};
 
 /// Stiffness of the contact with bone, N/mm.
@@ -13,7 +13,8 @@ pub(crate) const BONE_STIFFNESS: f32 = drilling::CONTACT_STIFFNESS.f32();
 pub(crate) const BONE: Viscoelastic =
     Viscoelastic { stiffness: BONE_STIFFNESS, damping: drilling::CONTACT_DAMPING_UNLIMITED.f32() };
 /// Contact with tissue of a hand that no device limits.
-pub(crate) const TISSUE: Viscoelastic = Viscoelastic { stiffness: 0.3, damping: 0.3 };
+pub(crate) const TISSUE: Viscoelastic =
+    Viscoelastic { stiffness: hands::TISSUE_STIFFNESS.f32(), damping: hands::TISSUE_DAMPING_UNLIMITED.f32() };
 
 /// Configuration of a haptic stage.
 #[derive(Clone, Debug)]
