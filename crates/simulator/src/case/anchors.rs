@@ -1,4 +1,4 @@
-//! How the brain is held in its skull: by its stem, by arachnoid and fluid, falx and bridging veins.
+//! How the brain is held in its skull: by its stem, arachnoid and fluid, falx and bridging veins.
 //!
 //! # Theory
 //! The lowest end of the brain, at the foramen magnum, is fixed. Every border node within reach of
