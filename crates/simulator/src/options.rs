@@ -159,8 +159,9 @@ pub struct Patient {
     /// Label volume of the brain: all nonzero voxels [default: segmented from the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
-    /// Tissue class from a label volume: white, grey, ventricle, tumour or vessel; all nonzero
-    /// voxels inside the brain, or only the codes. Repeatable
+    /// Tissue class from a label volume: white, grey, ventricle, tumour, vessel, basal-ganglia,
+    /// corpus-callosum or soft-tumour; all nonzero voxels inside the brain, or only the codes.
+    /// Repeatable
     #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
     pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]
