@@ -8,7 +8,7 @@
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
-use trepan_measurements::{brain, brain_living, fits, sensitivity};
+use trepan_measurements::{brain, brain_living, fits, hands, sensitivity};
 use trepan_simulator::{HapticConfig, Program, TissueClass};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
@@ -30,13 +30,12 @@ const END_MS: f32 = 1000.0;
 /// The scene with its constants.
 pub fn scene() -> Scene {
     let relaxed = 1.0 - Relaxation::SOLID_AND_FLUID.share.iter().map(|share| f64::from(*share)).sum::<f64>();
-    let spring = HapticConfig::usual(Program::Brain).tissue_force.stiffness;
     let mut inputs = of_brain();
     inputs.extend([
         Input::of("stress at hand speed over that of a slow test", fits::HAND_SPEED_FACTOR),
         Input { value: relaxed, ..Input::of("share of stress that stays", sensitivity::RELAXED_SHARE) },
         Input::of("times of relaxation", sensitivity::RELAXATION_TIMES),
-        Input { value: spring.into(), ..Input::of("spring of the hand on tissue", sensitivity::TISSUE_COUPLING) },
+        Input::of("spring of the hand on tissue", hands::TISSUE_STIFFNESS),
     ]);
     Scene { name: "press", inputs, outputs: ["greatest force, N", "force after 1 s, N"], run }
 }
