@@ -101,8 +101,8 @@ pub struct Options {
     /// exit
     #[arg(long)]
     pub list_constants: bool,
-    /// Young's modulus of the brain in a slow test, kPa; relaxation solid-and-fluid makes it stiffer
-    /// at hand speed [default: 3; a replay's as recorded]
+    /// Young's modulus of the brain in a slow test, kPa; with relaxation solid-and-fluid it is
+    /// stiffer at hand speed [default: 3; a replay's as recorded]
     #[arg(long, value_name = "KPA", allow_negative_numbers = true)]
     pub young_modulus_kpa: Option<f32>,
     /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default:

@@ -124,8 +124,8 @@ fn the_plain_element_is_the_independent_codes_and_the_averaged_one_does_not_lock
     assert!(plain_49 / 9.667 > 1.25, "the plain element must be seen to lock");
 }
 
-/// Faults and skipped time of a press of 8 mm into a block of 30 mm at the speed of a hand, and how
-/// far the block is from rest 3 s after, or after it was squashed to a share of its height, mm.
+/// Faults and skipped time, ms, of a press of 8 mm into a block of 30 mm. Then how far the block is
+/// from rest 3 s after, mm, and 3 s after it was squashed to a share of its height.
 fn pressed_and_squashed(material: Material, height: f32) -> (u32, f32, [f32; 2]) {
     let mesh = boxes::split_box([6; 3], Vec3::splat(30.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
