@@ -100,8 +100,8 @@ impl TissueClass {
     }
 
     /// Material of the class by the law fitted to human brain, for a Young's modulus of brain, MPa.
-    /// Regions are as soft against each other as they were measured. A ventricle is fluid and has no
-    /// such law.
+    /// Regions are as soft against each other as they were measured. A ventricle is fluid and has
+    /// no such law.
     pub fn stiffening(self, brain_mpa: f32) -> Material {
         let plain = self.material(brain_mpa);
         let Material::Stiffening { share, bound, poisson, density_g_mm3, .. } = self.preset() else { return plain };
