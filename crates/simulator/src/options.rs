@@ -101,8 +101,8 @@ pub struct Options {
     /// exit
     #[arg(long)]
     pub list_constants: bool,
-    /// Young's modulus of the brain in a slow test, kPa; relaxation solid-and-fluid makes it stiffer
-    /// at hand speed [default: 3; a replay's as recorded]
+    /// Young's modulus of the brain in a slow test, kPa; with relaxation solid-and-fluid it is
+    /// stiffer at hand speed [default: 3; a replay's as recorded]
     #[arg(long, value_name = "KPA", allow_negative_numbers = true)]
     pub young_modulus_kpa: Option<f32>,
     /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default:
@@ -159,8 +159,9 @@ pub struct Patient {
     /// Label volume of the brain: all nonzero voxels [default: segmented from the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
-    /// Tissue class from a label volume: white, grey, ventricle, tumour or vessel; all nonzero
-    /// voxels inside the brain, or only the codes. Repeatable
+    /// Tissue class from a label volume: white, grey, ventricle, tumour, vessel, basal-ganglia,
+    /// corpus-callosum or soft-tumour; all nonzero voxels inside the brain, or only the codes.
+    /// Repeatable
     #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
     pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]

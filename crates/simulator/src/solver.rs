@@ -247,7 +247,7 @@ mod tests {
         for law in [Law::StVenantKirchhoff, Law::MooneyRivlin, Law::Ogden, Law::Stiffening] {
             let (is, _) = pressed(&Ingredients { laws: [law; TissueClass::ALL.len()], ..plain.clone() });
             let change = (is[1] / usual[1] - 1.0).abs();
-            assert!((1e-4..0.5).contains(&change), "{law:?}: {is:?} of {usual:?}");
+            assert!((1e-4..1.0).contains(&change), "{law:?}: {is:?} of {usual:?}");
         }
     }
 
