@@ -187,21 +187,21 @@ fn through_s(tool: &Tool, newtons: f64, thick_mm: f32) -> f64 {
 fn pressing(findings: &mut Findings) {
     let thick_mm = skull::THICKNESS_PARIETAL.f32();
     let mean_n = hands::DRILLING_FORCE.value;
-    let speed = thick_mm / (1e3 * drilling::TIME_MANUAL.f32());
+    let speed = thick_mm / (1e3 * drilling::TIME_PERFORATOR.f32());
     let law = RemovalLaw::RATE;
     let fed =
         |radius_mm: f32, speed: f32| force_n(&law, radius_mm, std::f32::consts::PI * radius_mm * radius_mm * speed);
     let compared = [
-        Comparison::of(&drilling::TIME_MANUAL, How::Fitted, through_s(&Tool::burr(3.0), mean_n, thick_mm)),
+        Comparison::of(&drilling::TIME_PERFORATOR, How::Fitted, through_s(&Tool::burr(3.0), mean_n, thick_mm)),
         Comparison::of(&drilling::TIME_PERFORATOR, How::Fitted, through_s(&Tool::perforator(), mean_n, thick_mm)),
         Comparison::of(&hands::DRILLING_FORCE, How::Fitted, fed(3.0, speed)),
         Comparison::of(&hands::DRILLING_FORCE_LEAST, How::Fitted, f64::from(Cutter::BURR.rubbing_n(3.0))),
         Comparison::of(&hands::DRILLING_FORCE_MEAN, How::Predicted, fed(2.0, speed)),
     ];
     findings.rows.extend(compared.iter().map(Comparison::row));
-    let speeds = || (0..=30).map(|n| 0.04 * f64::from(n));
+    let speeds = || (0..=30).map(|n| 0.08 * f64::from(n));
     let line = |radius_mm: f32| speeds().map(|mm_s| (mm_s, fed(radius_mm, 1e-3 * mm_s as f32))).collect::<Vec<_>>();
-    let across = |row: &Row| vec![(0.0, row.value), (1.2, row.value)];
+    let across = |row: &Row| vec![(0.0, row.value), (2.4, row.value)];
     let lines = [
         ("6 mm burr", line(3.0)),
         ("4 mm burr", line(2.0)),
