@@ -53,6 +53,12 @@ enum Task {
         /// Another one
         new: PathBuf,
     },
+    /// Fit laws to published curves, report what they predict, draw curves over data
+    Calibrate {
+        /// Passed on: --write to write fixtures/measurements/fits.csv, --out DIR
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
     /// Check that every arrow between crates points down and that each crate does only what is its
     /// to do
     Layers,
@@ -84,6 +90,10 @@ fn run() -> Result<()> {
         Task::Merge { folders, out } => merge::run(&folders, &out),
         Task::Compare { old, new } => {
             validate(&["compare".into(), old.display().to_string(), new.display().to_string()])
+        }
+        Task::Calibrate { arguments } => {
+            let arguments = std::iter::once("calibrate".into()).chain(arguments);
+            validate(&arguments.collect::<Vec<String>>())
         }
         Task::Layers => report("layers", layers::check(&root())?),
         Task::Tidy => report("tidy", tidy(&root())?),

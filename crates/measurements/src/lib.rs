@@ -14,6 +14,12 @@
 //! assert!(curve.windows(2).all(|pair| pair[0].at < pair[1].at && pair[0].value < pair[1].value));
 //! ```
 
+/// Factor of a measured value of which no spread was published: a fifth, as for "inside" on the
+/// page "Against measurement".
+pub const NO_SPREAD: f64 = 1.2;
+/// Factor of a value that nobody measured, and of a fit without an error.
+pub const NOT_MEASURED: f64 = 2.0;
+
 /// One measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
@@ -87,6 +93,17 @@ impl Row {
         format!("{}/{}", self.table.replace('_', "-"), self.key)
     }
 
+    /// Factor by which the value may be larger or smaller: one standard deviation where a spread
+    /// was given, else [`NO_SPREAD`] for a measured value and [`NOT_MEASURED`] for any other.
+    pub fn factor(&self) -> f64 {
+        let share = self.relative_spread();
+        match share.is_finite() {
+            true => 1.0 + share,
+            false if self.is_calibrated() && !matches!(self.mark, Mark::Fit) => NO_SPREAD,
+            false => NOT_MEASURED,
+        }
+    }
+
     /// Spread as a share of the value; NaN where none was given.
     pub fn relative_spread(&self) -> f64 {
         self.spread / self.value.abs()
@@ -111,6 +128,14 @@ mod tests {
             assert!(rows.iter().all(|row| row.unit == rows[0].unit && row.value.is_finite()));
         }
         assert_eq!(find("brain/nothing"), None);
+    }
+
+    #[test]
+    fn a_factor_comes_from_the_spread_else_from_what_kind_of_value_it_is() {
+        let with = |spread, mark| Row { spread, value: -2.0, mark, ..brain::DENSITY }.factor();
+        assert_eq!(with(0.5, Mark::Uncalibrated), 1.25);
+        let factors = [Mark::Abstract, Mark::Memory, Mark::Fit].map(|mark| with(f64::NAN, mark));
+        assert_eq!(factors, [NO_SPREAD, NOT_MEASURED, NOT_MEASURED]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use crate::batch;
 use crate::case::choice::{Built, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
+use crate::constants;
 use crate::device_test;
 use crate::ingredients::table;
 use crate::models::ModelRequest;
@@ -51,6 +52,10 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         .init();
     if options.list_devices {
         trepan_haptics::list().iter().for_each(|device| println!("{:31} {}", device.name, device.state));
+        return ExitCode::SUCCESS;
+    }
+    if options.list_constants {
+        print!("{}", constants::table());
         return ExitCode::SUCCESS;
     }
     if options.lists_keys() {
@@ -156,6 +161,7 @@ fn report(ended: &Ended) -> ExitCode {
     if summary.replay.is_none() {
         slow(summary.rate_hz, summary.asked_hz).iter().for_each(|slow| println!("{slow}"));
     }
+    summary.bands.sentences().iter().for_each(|band| println!("{band}"));
     if summary.cut_off.pieces > 0 {
         let CutOff { pieces, largest_mm3 } = summary.cut_off;
         println!("cut off the skull: {pieces} piece(s) of bone, the largest of {largest_mm3:.0} mm3");

@@ -5,7 +5,7 @@ use crate::options::{CSF_SPEED_UPS, MODULI_KPA, Options, RATES_HZ};
 use crate::tissue_class::TissueClass;
 use trepan_haptics::DeviceName;
 use trepan_link::Recording;
-use trepan_measurements::support;
+use trepan_measurements::{brain_living, support};
 
 /// Default diameter of the flap that script `flap` cuts, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
@@ -13,8 +13,8 @@ const SCRIPTED_FLAP_MM: f32 = 24.0;
 const CSF_LOSS: f32 = support::CSF_LOSS.f32();
 /// Default factor by which the fluid drains faster than in a patient.
 const CSF_SPEED_UP: f32 = support::DRAIN_SPEED_UP.f32();
-/// Default Young's modulus of the brain, kPa.
-const YOUNG_KPA: f32 = 3.0;
+/// Default Young's modulus of the brain in a slow test, kPa.
+const YOUNG_KPA: f32 = brain_living::YOUNG_MODULUS.f32();
 /// Default haptic tick rate, Hz, numerical.
 const RATE_HZ: f32 = 1000.0;
 

@@ -1,5 +1,6 @@
 //! The command line that the three programs share.
 
+use crate::constants;
 use crate::error::SessionError;
 use crate::force_scale::ForceScale;
 use crate::ingredients::{Given, setting, table};
@@ -17,7 +18,7 @@ pub(crate) const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
 
 /// Flags of every program; names contain the unit.
 #[derive(Clone, Debug, Parser)]
-#[command(max_term_width = 120, version, args_conflicts_with_subcommands = true)]
+#[command(max_term_width = 120, version, args_conflicts_with_subcommands = true, after_long_help = constants::help())]
 pub struct Options {
     /// Task instead of a session
     #[command(subcommand)]
@@ -96,7 +97,12 @@ pub struct Options {
     /// List the haptic devices and what each needs, then exit
     #[arg(long)]
     pub list_devices: bool,
-    /// Young's modulus of the brain, kPa [default: 3; a replay's as recorded]
+    /// List the physical constants, what each was calibrated to, and which are uncalibrated, then
+    /// exit
+    #[arg(long)]
+    pub list_constants: bool,
+    /// Young's modulus of the brain in a slow test, kPa; relaxation solid-and-fluid makes it stiffer
+    /// at hand speed [default: 3; a replay's as recorded]
     #[arg(long, value_name = "KPA", allow_negative_numbers = true)]
     pub young_modulus_kpa: Option<f32>,
     /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default:
@@ -420,7 +426,8 @@ mod tests {
         assert!(parse("x --set speed=2").unwrap_err().to_string().contains("known are rigid, rigid-points, shaft"));
         assert!(parse("x --set element=hex").unwrap_err().to_string().contains("plain, locking-free"));
         assert!(parse("x --set list").unwrap().lists_keys() && !parse("x").unwrap().lists_keys());
-        assert!(parse("x --help").unwrap_err().to_string().contains("surface-pressure"));
+        let help = parse("x --help").unwrap_err().to_string();
+        assert!(help.contains("surface-pressure") && help.contains("physical constants rest on"), "{help}");
         assert!(parse("x --picture 960").is_err() && parse("x --picture 0x7").is_err());
     }
 }

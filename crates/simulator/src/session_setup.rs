@@ -177,13 +177,12 @@ impl SessionSetup {
 
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
         let (Held { fixed, anchors, mut wall }, settling) = self.held(brain, with)?;
+        let young_mpa = self.young_mpa * with.relaxation.hand_speed_factor();
         let body = Body {
             mesh: brain.mesh.clone(),
             fixed,
             anchors,
-            materials: TissueClass::ALL
-                .map(|class| with.laws[class as usize].like(class.material(self.young_mpa)))
-                .to_vec(),
+            materials: TissueClass::ALL.map(|class| with.laws[class as usize].material(class, young_mpa)).to_vec(),
             material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;

@@ -122,6 +122,7 @@ impl Ingredients {
             relaxation: match self.relaxation {
                 Relaxation::Off => trepan_tled::Relaxation::NONE,
                 Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
+                Relaxation::SolidAndFluid => trepan_tled::Relaxation::SOLID_AND_FLUID,
             },
             threads: self.threads.unwrap_or(1),
             still_mm: if self.steps_all() { 0.0 } else { self.still_mm },
@@ -194,7 +195,7 @@ mod tests {
     fn block(laws: &Ingredients) -> Body {
         let mesh = boxes::split_box([6; 3], Vec3::splat(30.0));
         let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
-        Body::uniform(mesh, fixed, laws.laws[0].like(TissueClass::Brain.material(0.003)))
+        Body::uniform(mesh, fixed, laws.laws[0].material(TissueClass::Brain, 0.003))
     }
 
     /// Depth of the middle of the top, mm, 60 ms after a spring began to press on it, and the
@@ -232,7 +233,7 @@ mod tests {
             let (is, _) = pressed(&with);
             assert!(is[0] > 1.002 * usual[0] && is[1] < usual[1], "{with:?}: {is:?} of {usual:?}");
         }
-        for law in [Law::StVenantKirchhoff, Law::MooneyRivlin, Law::Ogden] {
+        for law in [Law::StVenantKirchhoff, Law::MooneyRivlin, Law::Ogden, Law::Stiffening] {
             let (is, _) = pressed(&Ingredients { laws: [law; TissueClass::ALL.len()], ..plain.clone() });
             let change = (is[1] / usual[1] - 1.0).abs();
             assert!((1e-4..0.5).contains(&change), "{law:?}: {is:?} of {usual:?}");
@@ -263,7 +264,11 @@ mod tests {
             |positions: &[Vec3]| (0..all).filter(is_inside).map(|tet| volume(tet, positions)).sum::<f32>();
         let share = of_ventricle(filled.positions()) / of_ventricle(&hollow.mesh.positions);
         assert!(share > 0.8, "the ventricle keeps {share} of its volume");
-        let much = Ingredients { surface_pressure_mmhg: 60.0, laws: [Law::StVenantKirchhoff; 6], ..with.clone() };
+        let much = Ingredients {
+            surface_pressure_mmhg: 60.0,
+            laws: [Law::StVenantKirchhoff; TissueClass::ALL.len()],
+            ..with.clone()
+        };
         let fault = build(&block(&much), None, &TLED, &much).err().map(|fault| fault.to_string());
         assert!(
             fault.as_ref().is_some_and(|fault| fault.contains("surface-pressure=60: the brain does not")),

@@ -27,11 +27,27 @@ pub enum TissueClass {
     Tumour,
     /// Blood vessels.
     Vessel,
+    /// Basal ganglia: caudate, putamen, pallidum, accumbens.
+    BasalGanglia,
+    /// Corpus callosum.
+    CorpusCallosum,
+    /// Tumour softer than the brain around it, such as a glioblastoma.
+    SoftTumour,
 }
 
 impl TissueClass {
     /// All classes; the index is the code minus one.
-    pub const ALL: [Self; 6] = [Self::Brain, Self::White, Self::Grey, Self::Ventricle, Self::Tumour, Self::Vessel];
+    pub const ALL: [Self; 9] = [
+        Self::Brain,
+        Self::White,
+        Self::Grey,
+        Self::Ventricle,
+        Self::Tumour,
+        Self::Vessel,
+        Self::BasalGanglia,
+        Self::CorpusCallosum,
+        Self::SoftTumour,
+    ];
 
     /// Value in a class volume; 0 is outside the brain.
     pub fn code(self) -> u8 {
@@ -40,7 +56,8 @@ impl TissueClass {
 
     /// Name in flags and remarks.
     pub fn name(self) -> &'static str {
-        ["brain", "white", "grey", "ventricle", "tumour", "vessel"][self as usize]
+        let first = ["brain", "white", "grey", "ventricle", "tumour", "vessel"];
+        first.into_iter().chain(["basal-ganglia", "corpus-callosum", "soft-tumour"]).nth(self as usize).unwrap_or("")
     }
 
     /// Class with a name.
@@ -52,14 +69,16 @@ impl TissueClass {
     /// with colour blindness (Okabe and Ito 2008).
     pub fn tint(self) -> [u8; 3] {
         match self {
-            Self::Tumour => [213, 94, 0],
+            Self::Tumour | Self::SoftTumour => [213, 94, 0],
             Self::Vessel => [86, 180, 233],
-            Self::Brain | Self::White | Self::Grey | Self::Ventricle => [0; 3],
+            Self::Brain | Self::White | Self::Grey | Self::Ventricle | Self::BasalGanglia | Self::CorpusCallosum => {
+                [0; 3]
+            }
         }
     }
 
-    /// Material of the class for a Young's modulus of brain, MPa: the presets of `soft`, scaled by
-    /// one factor.
+    /// Neo-Hookean material of the class for a Young's modulus of brain, MPa: the presets of `soft`,
+    /// scaled by one factor.
     ///
     /// A vessel is ten times as stiff as brain. Its wall is stiffer ([`Material::VESSEL_WALL`]),
     /// but would shorten the stable time step many times.
@@ -72,10 +91,42 @@ impl TissueClass {
                 Self::Grey => share(Material::GREY_MATTER),
                 Self::Ventricle => share(Material::VENTRICLE),
                 Self::Tumour => share(Material::TUMOUR),
-                Self::Vessel => 10.0,
+                Self::Vessel => trepan_measurements::tissue::VESSEL_RATIO.f32(),
+                Self::BasalGanglia | Self::CorpusCallosum => self.over_brain(),
+                Self::SoftTumour => share(Material::SOFT_TUMOUR),
             };
         let poisson = if self == Self::Ventricle { Material::VENTRICLE.poisson() } else { Material::BRAIN.poisson() };
         Material::NeoHookean { young_mpa, poisson, density_g_mm3: Material::BRAIN.density_g_mm3() }
+    }
+
+    /// Material of the class by the law that is fitted to human brain, for a Young's modulus of
+    /// brain, MPa: regions as soft against each other as they were measured. A ventricle is fluid
+    /// and has no such law.
+    pub fn stiffening(self, brain_mpa: f32) -> Material {
+        let plain = self.material(brain_mpa);
+        let Material::Stiffening { share, bound, poisson, density_g_mm3, .. } = self.preset() else { return plain };
+        let regions = [Self::White, Self::Grey, Self::BasalGanglia, Self::CorpusCallosum];
+        let young_mpa = if regions.contains(&self) { brain_mpa * self.over_brain() } else { plain.young_mpa() as f32 };
+        let shear_mpa = young_mpa / (2.0 * (1.0 + poisson));
+        Material::Stiffening { shear_mpa, share, bound, poisson, density_g_mm3 }
+    }
+
+    /// What the class is made of, as fitted to human brain; brain without a class for what was not
+    /// fitted.
+    fn preset(self) -> Material {
+        match self {
+            Self::White => Material::CORONA_RADIATA,
+            Self::Grey => Material::CORTEX,
+            Self::BasalGanglia => Material::BASAL_GANGLIA,
+            Self::CorpusCallosum => Material::CORPUS_CALLOSUM,
+            Self::Ventricle => Material::VENTRICLE,
+            Self::Brain | Self::Tumour | Self::Vessel | Self::SoftTumour => Material::WHOLE_BRAIN,
+        }
+    }
+
+    /// Shear modulus over that of brain without a class, as fitted.
+    fn over_brain(self) -> f32 {
+        (self.preset().shear_mpa() / Material::WHOLE_BRAIN.shear_mpa()) as f32
     }
 }
 
@@ -95,6 +146,20 @@ impl TissueSource {
     /// The ventricles in a FreeSurfer segmentation (lateral, inferior lateral, third, fourth).
     pub fn ventricles_of_aseg(path: PathBuf) -> Self {
         Self { class: TissueClass::Ventricle, path, codes: vec![4, 5, 14, 15, 43, 44] }
+    }
+
+    /// The regions of the brain in a FreeSurfer segmentation that were measured apart, then its
+    /// ventricles.
+    pub fn regions_of_aseg(path: PathBuf) -> Vec<Self> {
+        let of = |(class, codes): (TissueClass, &[u16])| Self { class, path: path.clone(), codes: codes.into() };
+        let regions: [(TissueClass, &[u16]); 4] = [
+            (TissueClass::White, &[2, 41]),
+            (TissueClass::Grey, &[3, 42]),
+            (TissueClass::BasalGanglia, &[11, 12, 13, 26, 50, 51, 52, 58]),
+            (TissueClass::CorpusCallosum, &[251, 252, 253, 254, 255]),
+        ];
+        let ventricles = Self::ventricles_of_aseg(path.clone());
+        regions.into_iter().map(of).chain([ventricles]).collect()
     }
 
     fn contains(&self, code: u16) -> bool {
@@ -198,6 +263,8 @@ mod tests {
         for (at, class) in TissueClass::ALL.into_iter().enumerate() {
             assert_eq!(class.code() as usize, at + 1);
             class.material(0.003).check().unwrap();
+            class.stiffening(0.003).check().unwrap();
+            assert_eq!(TissueClass::named(class.name()), Some(class));
         }
         assert!(TissueClass::Tumour.material(0.003).young_mpa() > 2.0 * TissueClass::Brain.material(0.003).young_mpa());
     }

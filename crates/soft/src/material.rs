@@ -6,25 +6,40 @@
 //! κ, tied by Poisson's ratio: `κ = 2 μ (1+ν) / (3 (1-2ν))`, `E = 2 μ (1+ν)`.
 //!
 //! # Sources
-//! No preset is calibrated: each takes its number from the paper named, cited from memory and not
-//! compared with its text, and none was fitted to data here. Reports of living brain range over a
-//! factor of three; replace the numbers where forces matter.
-//!
-//! Wittek, Miller, Kikinis, Warfield, J. Biomech. 40 (2007): brain shift with 3 kPa. Miller and
-//! Chinzei, J. Biomech. 35 (2002): Ogden's law with 842 Pa and exponent -4.7, for brain in tension
-//! and compression. Both near 3 kPa at the strain rates of surgery. Budday et al., J. Mech. Behav.
-//! Biomed. Mater. 46 (2015), 318-330: white matter 1.895 kPa, grey 1.389 kPa (bovine, indentation);
-//! [`Material::WHITE_MATTER`] and [`Material::GREY_MATTER`] keep their ratio and, in equal shares,
-//! the 3 kPa of living brain, since what is dead and slow is softer. Wittek et al., Prog. Biophys.
-//! Mol. Biol. 103 (2010): ventricles as a solid of 10 Pa and ν 0.1, which the fluid can leave.
-//! Torii et al., Comput. Methods Appl. Mech. Eng. 195 (2006): wall of a cerebral artery 1 MPa, ν
-//! 0.45.
+//! Every preset but [`Material::THESIS`] is written in terms of rows of `trepan-measurements`,
+//! which name their papers. [`Material::CORTEX`] and the regions after it are fitted to human brain
+//! at the speed of a slow test (`cargo xtask calibrate`; Budday et al., Acta Biomater. 48, 2017).
+//! The neo-Hookean presets are **uncalibrated**: assumptions of models, and bovine indentation for
+//! the ratio of white to grey matter, which human brain contradicts. Reports of living brain range
+//! over a factor of three.
 //!
 //! # When not to use it
 //! St. Venant-Kirchhoff gives way under compression beyond a stretch of about 0.6 and does not heal
 //! when turned inside out: it is here to be compared with.
 
 use crate::{Law, NeoHookean, Stiffening};
+use trepan_measurements::{Row, brain_living as living, fits, tissue};
+
+const MPA_PER_KPA: f32 = 1e-3; // by definition
+const POISSON: f32 = living::POISSON.f32();
+/// Density of water, g/mm³, by definition of the gram in good approximation.
+const WATER_G_MM3: f32 = 1e-3;
+const WHITE_OVER_GREY: f32 = tissue::WHITE_OVER_GREY.f32();
+
+const fn neo_hookean(young_kpa: f32) -> Material {
+    Material::NeoHookean { young_mpa: MPA_PER_KPA * young_kpa, poisson: POISSON, density_g_mm3: WATER_G_MM3 }
+}
+
+/// The stiffening law with rows of shear modulus, kPa, share and bound.
+const fn stiffening([shear, share, bound]: [&Row; 3]) -> Material {
+    Material::Stiffening {
+        shear_mpa: MPA_PER_KPA * shear.f32(),
+        share: share.f32(),
+        bound: bound.f32(),
+        poisson: POISSON,
+        density_g_mm3: WATER_G_MM3,
+    }
+}
 
 /// A hyperelastic material. A closed list: every solver matches on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,36 +135,68 @@ pub enum MaterialError {
 }
 
 impl Material {
-    /// Living brain, uncalibrated: 3 kPa (Wittek et al. 2007), ν 0.45 (the most that plain
-    /// tetrahedra bear), density of water.
-    pub const BRAIN: Self = Self::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1.0e-3 };
+    /// Living brain, neo-Hookean, uncalibrated: a modulus of models of brain shift, ν the most that
+    /// plain tetrahedra bear, density of water.
+    pub const BRAIN: Self = neo_hookean(living::YOUNG_MODULUS.f32());
 
     /// Brain that answers tension and compression differently (Miller and Chinzei 2002),
-    /// instantaneous moduli, uncalibrated.
-    pub const BRAIN_OGDEN: Self =
-        Self::Ogden { shear_mpa: [8.42e-4, 0.0], exponent: [-4.7, 1.0], poisson: 0.45, density_g_mm3: 1.0e-3 };
+    /// instantaneous moduli of swine.
+    pub const BRAIN_OGDEN: Self = Self::Ogden {
+        shear_mpa: [MPA_PER_KPA * living::SWINE_OGDEN_SHEAR_MODULUS.f32(), 0.0],
+        exponent: [living::SWINE_OGDEN_EXPONENT.f32(), 1.0],
+        poisson: POISSON,
+        density_g_mm3: WATER_G_MM3,
+    };
 
-    /// White matter, uncalibrated: 1.36 times as stiff as grey (Budday et al. 2015), the mean of
-    /// both [`Material::BRAIN`]'s.
-    pub const WHITE_MATTER: Self = Self::NeoHookean { young_mpa: 0.003_46, poisson: 0.45, density_g_mm3: 1.0e-3 };
+    /// Brain without a region: mean of [`Material::CORTEX`] and [`Material::CORONA_RADIATA`].
+    pub const WHOLE_BRAIN: Self = stiffening([&fits::BRAIN_SHEAR_MODULUS, &fits::BRAIN_SHARE, &fits::BRAIN_BOUND]);
 
-    /// Grey matter, uncalibrated (Budday et al. 2015).
-    pub const GREY_MATTER: Self = Self::NeoHookean { young_mpa: 0.002_54, poisson: 0.45, density_g_mm3: 1.0e-3 };
+    /// Human cortex, ex vivo, at the speed of a slow test: stiffening law fitted to tension and
+    /// compression.
+    pub const CORTEX: Self = stiffening([&fits::CORTEX_SHEAR_MODULUS, &fits::CORTEX_SHARE, &fits::CORTEX_BOUND]);
+
+    /// Human corona radiata: white matter, fitted as [`Material::CORTEX`].
+    pub const CORONA_RADIATA: Self =
+        stiffening([&fits::CORONA_RADIATA_SHEAR_MODULUS, &fits::CORONA_RADIATA_SHARE, &fits::CORONA_RADIATA_BOUND]);
+
+    /// Human basal ganglia, fitted to their published Ogden fit.
+    pub const BASAL_GANGLIA: Self =
+        stiffening([&fits::BASAL_GANGLIA_SHEAR_MODULUS, &fits::BASAL_GANGLIA_SHARE, &fits::BASAL_GANGLIA_BOUND]);
+
+    /// Human corpus callosum, fitted to its published Ogden fit.
+    pub const CORPUS_CALLOSUM: Self =
+        stiffening([&fits::CORPUS_CALLOSUM_SHEAR_MODULUS, &fits::CORPUS_CALLOSUM_SHARE, &fits::CORPUS_CALLOSUM_BOUND]);
+
+    /// White matter, neo-Hookean, uncalibrated: bovine, stiffer than grey, the mean of both
+    /// [`Material::BRAIN`]'s. Human white matter is softer: [`Material::CORONA_RADIATA`].
+    pub const WHITE_MATTER: Self =
+        neo_hookean(living::YOUNG_MODULUS.f32() * 2.0 * WHITE_OVER_GREY / (1.0 + WHITE_OVER_GREY));
+
+    /// Grey matter, neo-Hookean, uncalibrated; see [`Material::WHITE_MATTER`].
+    pub const GREY_MATTER: Self = neo_hookean(living::YOUNG_MODULUS.f32() * 2.0 / (1.0 + WHITE_OVER_GREY));
 
     /// A ventricle filled with CSF, uncalibrated (Wittek et al. 2010). It is a solid so soft and
     /// compressible that it neither holds the brain up nor keeps it from closing.
-    pub const VENTRICLE: Self = Self::NeoHookean { young_mpa: 1.0e-5, poisson: 0.1, density_g_mm3: 1.0e-3 };
+    pub const VENTRICLE: Self = Self::NeoHookean {
+        young_mpa: MPA_PER_KPA * tissue::VENTRICLE_YOUNG_MODULUS.f32(),
+        poisson: tissue::VENTRICLE_POISSON.f32(),
+        density_g_mm3: WATER_G_MM3,
+    };
 
     /// Wall of a cerebral artery, uncalibrated (Torii et al. 2006): 300 times as stiff as brain. It
     /// shortens the stable step 18 times where elements are as large.
-    pub const VESSEL_WALL: Self = Self::NeoHookean { young_mpa: 1.0, poisson: 0.45, density_g_mm3: 1.0e-3 };
+    pub const VESSEL_WALL: Self = neo_hookean(tissue::ARTERY_YOUNG_MODULUS.f32());
 
-    /// A tumour, uncalibrated, without a source: three times as stiff as the brain around it
-    /// (reports range from 2 to 10 times).
-    pub const TUMOUR: Self = Self::NeoHookean { young_mpa: 0.009, poisson: 0.45, density_g_mm3: 1.0e-3 };
+    /// A firm tumour, uncalibrated: three times as stiff as the brain around it (assumptions range
+    /// from 2 to 10 times).
+    pub const TUMOUR: Self = neo_hookean(living::YOUNG_MODULUS.f32() * tissue::STIFF_TUMOUR_RATIO.f32());
+
+    /// A soft tumour: a glioblastoma over the healthy white matter of the same patients, by
+    /// magnetic resonance elastography.
+    pub const SOFT_TUMOUR: Self = neo_hookean(living::YOUNG_MODULUS.f32() * tissue::SOFT_TUMOUR_RATIO.f32());
 
     /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more
-    /// compressible than living brain.
+    /// compressible than living brain; numerical, to compare with it.
     pub const THESIS: Self = Self::NeoHookean { young_mpa: 0.030, poisson: 0.3, density_g_mm3: 1.0e-3 };
 
     /// Refuses parameters that no material has, and fits that are not convex.
@@ -261,13 +308,24 @@ mod tests {
     #[test]
     fn presets_are_accepted_and_the_thesis_wave_speed_is_6_35_m_per_s() {
         let parts = [Material::WHITE_MATTER, Material::GREY_MATTER, Material::VENTRICLE, Material::VESSEL_WALL];
-        for preset in
-            [Material::BRAIN, Material::BRAIN_OGDEN, Material::TUMOUR, Material::THESIS].into_iter().chain(parts)
+        let regions = [
+            Material::WHOLE_BRAIN,
+            Material::CORTEX,
+            Material::CORONA_RADIATA,
+            Material::BASAL_GANGLIA,
+            Material::CORPUS_CALLOSUM,
+            Material::SOFT_TUMOUR,
+        ];
+        for preset in [Material::BRAIN, Material::BRAIN_OGDEN, Material::TUMOUR, Material::THESIS]
+            .into_iter()
+            .chain(parts)
+            .chain(regions)
         {
             assert_eq!(preset.check(), Ok(()));
         }
         assert!((Material::THESIS.wave_speed() - 6.35).abs() < 0.01);
         assert!((Material::BRAIN.wave_speed() - 3.37).abs() < 0.01);
+        assert!(Material::CORTEX.shear_mpa() > 1.5 * Material::CORONA_RADIATA.shear_mpa());
     }
 
     #[test]

@@ -18,10 +18,10 @@ use crate::body::Element;
 use crate::bound::dot;
 use crate::energy::{cofactor, cofactor_change, squared};
 use crate::factor::Factor;
-use crate::{Body, Law};
+use crate::{Anchor, Body, Law, Loads};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
-use trepan_contact::{NodalContact, NodalContacts};
+use trepan_contact::NodalContact;
 
 /// Most attempts to make the matrix positive definite by a shift.
 const SHIFTS: u32 = 12;
@@ -34,6 +34,7 @@ pub struct Tangent {
     laws: Vec<Law>,
     /// Node groups over which pressure is averaged; empty where it is not.
     groups: Vec<Group>,
+    anchors: Vec<Anchor>,
     rest: Vec<DVec3>,
     fixed: Vec<bool>,
     factor: Factor,
@@ -76,21 +77,32 @@ impl Tangent {
         let mean_mm = (body.mesh.total_mm3() / elements.len() as f64).cbrt();
         let element_stiffness = laws.iter().map(|law| law.moduli().0).fold(0.0, f64::max) * mean_mm;
         let rest = body.mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-        Some(Self { elements, laws, groups, rest, fixed, factor, springs: Vec::new(), element_stiffness })
+        Some(Self {
+            elements,
+            laws,
+            groups,
+            anchors: body.anchors.clone(),
+            rest,
+            fixed,
+            factor,
+            springs: Vec::new(),
+            element_stiffness,
+        })
     }
 
-    /// Assembles and factors the tangent at displacements `u`, mm, with the springs that press now.
-    /// False when no shift made it positive definite.
-    pub fn factor(&mut self, u: &[DVec3], contacts: &NodalContacts) -> bool {
+    /// Assembles and factors the tangent at displacements `u`, mm, with the anchors that hold and the
+    /// springs that press there. False when no shift made it positive definite.
+    pub fn factor(&mut self, u: &[DVec3], loads: &Loads) -> bool {
         let depth_mm = |contact: &NodalContact| -> f64 {
             let along = |(n, w): (usize, f64)| w * (self.rest[n] + u[n]).dot(contact.normal.as_dvec3());
             f64::from(contact.offset_mm) + known(contact, u.len()).map(along).sum::<f64>()
         };
         let presses = |contact: &NodalContact| contact.stiffness > 0.0 && depth_mm(contact) > 0.0;
-        let pressing: Vec<NodalContact> = contacts.all().filter(presses).collect();
+        let pressing: Vec<NodalContact> = loads.contacts.all().filter(presses).collect();
         let mut shift = 0.0;
         for _ in 0..SHIFTS {
-            self.assemble(u, &pressing);
+            self.assemble(u);
+            self.add_nodal(u, loads, &pressing);
             self.factor.add_diagonal(|_| shift);
             if self.factor.factor() {
                 self.take_in(&pressing);
@@ -113,7 +125,7 @@ impl Tangent {
         self.elements.iter().map(gradient).fold(0.0, f64::max).sqrt()
     }
 
-    fn assemble(&mut self, u: &[DVec3], pressing: &[NodalContact]) {
+    fn assemble(&mut self, u: &[DVec3]) {
         self.factor.clear();
         let pressures = self.add_groups(u);
         for (t, Element { corners, shape, material }) in self.elements.iter().enumerate() {
@@ -133,7 +145,6 @@ impl Tangent {
                 }
             }
         }
-        self.add_planes(pressing);
     }
 
     /// Adds the terms of node groups; gives the pressure of every element, MPa.
@@ -165,8 +176,17 @@ impl Tangent {
         pressures
     }
 
-    /// Adds springs of one node, such as planes.
-    fn add_planes(&mut self, pressing: &[NodalContact]) {
+    /// Adds anchors and springs of one node, such as planes.
+    fn add_nodal(&mut self, u: &[DVec3], loads: &Loads, pressing: &[NodalContact]) {
+        for &Anchor { node, normal, along, across, in_fluid, .. } in &self.anchors {
+            let place = self.rest[node as usize] + u[node as usize];
+            let held = 1.0 - f64::from(in_fluid * loads.fluid.dryness(place.as_vec3()));
+            let (normal, across) = (normal.as_dvec3(), f64::from(across));
+            let more = normal * (f64::from(along) - across);
+            let stiffness = DMat3::from_diagonal(DVec3::splat(across))
+                + DMat3::from_cols(more * normal.x, more * normal.y, more * normal.z);
+            self.factor.add(node, node, stiffness * held);
+        }
         for contact in pressing.iter().filter(|contact| is_single(contact)) {
             let (normal, stiffness) = (contact.normal.as_dvec3(), f64::from(contact.stiffness));
             for (n, w) in known(contact, self.fixed.len()) {
@@ -246,7 +266,7 @@ mod tests {
         let mut force = rest.clone();
         Stiffness::of(&body).apply(&wanted, &mut force);
         let mut tangent = Tangent::of(&body, false).unwrap();
-        assert!(tangent.factor(&rest, &NodalContacts::none()));
+        assert!(tangent.factor(&rest, &Loads::default()));
         let mut found = force.clone();
         tangent.solve(&mut found);
         assert!(apart(&found, &wanted) < 1e-9, "{}", apart(&found, &wanted));
@@ -258,7 +278,7 @@ mod tests {
             let mut pressed = force.clone();
             let along: f64 = known(&spring, rest.len()).map(|(n, w)| w * wanted[n].z).sum();
             known(&spring, rest.len()).for_each(|(n, w)| pressed[n].z += 100.0 * w * along);
-            assert!(tangent.factor(&rest, &spring.into()));
+            assert!(tangent.factor(&rest, &Loads { contacts: spring.into(), ..Loads::default() }));
             tangent.solve(&mut pressed);
             assert!(apart(&pressed, &wanted) < 1e-7, "{}", apart(&pressed, &wanted));
         }
@@ -269,10 +289,10 @@ mod tests {
     fn averaged_pressure_softens_all_but_an_even_change_of_volume() {
         let body = Body { fixed: vec![0], ..block() };
         let even: Vec<DVec3> = body.mesh.positions.iter().map(|p| p.as_dvec3() * 1e-3).collect();
-        let uneven: Vec<DVec3> = even.iter().zip(noise(&body)).map(|(e, n)| *e + n * 1e-3).collect();
+        let uneven = noise(&body);
         let energy = |averaged: bool, u: &[DVec3]| {
             let mut tangent = Tangent::of(&body, averaged).unwrap();
-            tangent.assemble(&vec![DVec3::ZERO; u.len()], &[]);
+            tangent.assemble(&vec![DVec3::ZERO; u.len()]);
             tangent.factor.work(u)
         };
         let (plain, averaged) = (energy(false, &even), energy(true, &even));

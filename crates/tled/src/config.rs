@@ -24,8 +24,8 @@ pub struct Config {
     pub balanced_gravity: Vec3,
     /// Share of the body's mass that may be added to the elements with the shortest stable step;
     /// 0 = none. A hundredth is imperceptible and lengthens the step of a mesh with slivers; weight
-    /// does not change. Infinite = all elements get the same stable step; only for
-    /// [`settle`](crate::Tled::settle), where only the equilibrium matters.
+    /// does not change. Infinite = all elements get the same stable step; only where the motion
+    /// towards equilibrium does not matter.
     pub mass_scaling: f32,
     /// Largest factor on an element's mass while it is stiffer than at rest; 1 = none. A few such
     /// elements do not shorten the step of the whole body then; weight does not change.

@@ -309,14 +309,18 @@ impl Nodes {
         self.v.set(place, velocity.extend(0.0).to_array());
     }
 
-    /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, N; zero for a fixed
-    /// node.
-    pub fn weight(&self, place: usize, gravity: Vec3) -> Vec3 {
+    /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, and the force of its
+    /// anchor, N; zero for a fixed node.
+    pub fn force_at_rest(&self, place: usize, gravity: Vec3, fluid: &Fluid) -> Vec3 {
         if self.inverse_mass[place] == 0.0 {
-            Vec3::ZERO
-        } else {
-            gravity * (self.weight[place] / self.inverse_mass[place])
+            return Vec3::ZERO;
         }
+        let (u, dryness) = (self.displacement(place), fluid.dryness(self.position(place)));
+        let weight = (gravity + fluid.weight * dryness) * (self.weight[place] / self.inverse_mass[place]);
+        let Some(anchor) = self.anchors.get(place) else { return weight };
+        let (held, out) = (1.0 - anchor.in_fluid * dryness, anchor.normal * u.dot(anchor.normal));
+        let taken = (out * anchor.along + (u - out) * anchor.across) * held;
+        weight + anchor.normal * (anchor.open_mm2 * fluid.opening_mpa) - taken
     }
 
     /// Velocity of the node at a place, mm/ms.

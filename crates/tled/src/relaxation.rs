@@ -11,10 +11,13 @@
 //!
 //! # Sources
 //! Taylor, Comas, Cheng, Passenger, Hawkes, Atkinson, Ourselin, Med. Image Anal. 13 (2009). Brain:
-//! Miller and Chinzei 2002.
+//! rows of `trepan-measurements`, named at each preset.
 
+use trepan_measurements::{brain_relaxation as rows, fits};
 use trepan_soft::BodyError;
 use trepan_soft::simd::Lane;
+
+const MS_PER_S: f32 = 1e3;
 
 /// Number of Prony terms.
 pub const PRONY_TERMS: usize = 3;
@@ -40,9 +43,27 @@ impl Relaxation {
     /// No relaxation: elastic.
     pub const NONE: Self = Self { share: [0.0; PRONY_TERMS], time_ms: [1.0; PRONY_TERMS] };
 
-    /// Brain after Miller and Chinzei 2002, uncalibrated: 45 % with a time constant of 0.5 s, 36.5
-    /// % with 50 s.
-    pub const BRAIN: Self = Self { share: [0.450, 0.365, 0.0], time_ms: [500.0, 50_000.0, 1.0] };
+    /// Swine after Miller and Chinzei 2002, from memory, uncalibrated: 45 % with a time constant of
+    /// 0.5 s, 36.5 % with 50 s.
+    pub const BRAIN: Self = Self {
+        share: [rows::SWINE_FAST_SHARE.f32(), rows::SWINE_SLOW_SHARE.f32(), 0.0],
+        time_ms: [MS_PER_S * rows::SWINE_FAST_TIME.f32(), MS_PER_S * rows::SWINE_SLOW_TIME.f32(), 1.0],
+    };
+
+    /// Brain at held strain over four minutes (Amedieu 2004): the solid's time from human cortex in
+    /// shear, then pore fluid in tens of seconds and minutes.
+    pub const SOLID_AND_FLUID: Self = Self {
+        share: [
+            fits::RELAXATION_SOLID_SHARE.f32(),
+            fits::RELAXATION_FLUID_SHARE.f32(),
+            fits::RELAXATION_SLOW_SHARE.f32(),
+        ],
+        time_ms: [
+            MS_PER_S * rows::CORTEX_TIME.f32(),
+            MS_PER_S * rows::FLUID_TIME.f32(),
+            MS_PER_S * rows::SLOW_TIME.f32(),
+        ],
+    };
 
     /// Whether there is no relaxation.
     pub fn is_none(&self) -> bool {
@@ -78,6 +99,7 @@ mod tests {
         let with = |share, time_ms| Relaxation { share, time_ms }.check();
         assert!(
             Relaxation::BRAIN.check().is_ok()
+                && Relaxation::SOLID_AND_FLUID.check().is_ok()
                 && Relaxation::NONE.check().is_ok()
                 && Relaxation::default().check().is_ok()
         );

@@ -108,7 +108,9 @@ impl Tled {
         let mut settled = Settled { left_mm: f32::INFINITY, ..Settled::default() };
         let is_exact = !self.base.config.averaged_pressure || self.locks();
         let averaged = self.base.config.averaged_pressure && is_exact;
-        let tangent = self.base.supported.then(|| Tangent::of(&self.body, averaged)).flatten();
+        let is_held =
+            self.base.supported || self.body.anchors.iter().any(|anchor| anchor.along.min(anchor.across) > 0.0);
+        let tangent = is_held.then(|| Tangent::of(&self.body, averaged)).flatten();
         let Some(mut tangent) = tangent else { return settled };
         let mut changes = VecDeque::with_capacity(MEMORY + 1);
         let mut at = self.evaluate(self.displacements(), loads, &mut settled);
@@ -125,7 +127,7 @@ impl Tled {
             };
             let aged = factored_at.as_ref().map_or(1.0, |then| tangent.steepest(&difference(&at.u, then)));
             if aged > old {
-                if !tangent.factor(&at.u, &loads.contacts) {
+                if !tangent.factor(&at.u, loads) {
                     break;
                 }
                 if aged > OLD {
@@ -211,8 +213,9 @@ impl Tled {
         let (place_of, elements) = (&self.base.layout.place_of, &self.elements);
         let nodes = elements.nodes();
         let gravity = loads.gravity - self.base.config.balanced_gravity;
-        let mut residual: Vec<DVec3> =
-            places().map(|place| (elements.force(place) + nodes.weight(place, gravity)).as_dvec3()).collect();
+        let mut residual: Vec<DVec3> = places()
+            .map(|place| (elements.force(place) + nodes.force_at_rest(place, gravity, &loads.fluid)).as_dvec3())
+            .collect();
         let free = |n: u32| {
             let place = place_of[n as usize] as usize;
             FreeNode { position: nodes.position(place), velocity: Vec3::ZERO, inverse_mass: nodes.inverse_mass[place] }

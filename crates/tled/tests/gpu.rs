@@ -161,8 +161,9 @@ fn every_law_with_averaged_pressure_and_relaxation_agrees_with_the_processor() {
 fn a_body_of_every_law_at_once_with_scaled_masses_agrees_too() {
     let Some(gpu) = device() else { return };
     let mut body = body();
-    body.materials = vec![Material::BRAIN, KIRCHHOFF, MOONEY, TWO_TERMS, STIFFENING, Material::VENTRICLE];
-    body.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t / 17 % 6) as u8);
+    body.materials =
+        vec![Material::BRAIN, KIRCHHOFF, MOONEY, TWO_TERMS, STIFFENING, Material::TUMOUR, Material::VENTRICLE];
+    body.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t / 17 % 7) as u8);
     let config = Config {
         averaged_pressure: true,
         relaxation: FADING,

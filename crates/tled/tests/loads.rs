@@ -1,4 +1,4 @@
-//! Moving supports, pressure, dynamic relaxation and mass scaling against the f64 reference.
+//! Moving supports, pressure, equilibrium and mass scaling against the f64 reference.
 
 use glam::DVec3;
 use trepan_contact::NodalContact;

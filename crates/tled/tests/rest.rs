@@ -4,7 +4,7 @@ use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::Surface;
 use trepan_soft::rivals::reference::{self, Reference};
-use trepan_soft::{Body, Loads, Material, SoftSolver, SurfacePressure, boxes};
+use trepan_soft::{Anchor, Body, Fluid, Loads, Material, SoftSolver, SurfacePressure, boxes};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
 
 /// A body under loads.
@@ -64,6 +64,17 @@ fn pressed(body: &Body, reach_mm: f32, stiffness: f32) -> Loads {
     Loads { contacts: contact.into(), ..Loads::default() }
 }
 
+/// The block, held at its sides by springs, half of which hold in fluid only, and half of it dry.
+fn anchored() -> Case {
+    let mut body = block();
+    let beside = |p: Vec3| p.x < 1e-3 && p.z > 1.0;
+    let anchor = |node| Anchor { node, normal: Vec3::X, along: 1e-3, across: 2e-4, in_fluid: 0.5, open_mm2: 2.0 };
+    body.anchors = boxes::nodes_where(&body.mesh, beside).into_iter().map(anchor).collect();
+    let weight = Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2;
+    let fluid = Fluid { level_mm: 20.0, weight, opening_mpa: 1e-4, ..Fluid::default() };
+    Case::of("anchors and fluid", body, false, Loads { fluid, ..Loads::default() })
+}
+
 fn cases() -> Vec<Case> {
     let (one, many) = (pressed(&block(), 1.0, 1e4), pressed(&block(), 13.0, 0.3));
     let triangles = Surface::of(&block().mesh).triangles;
@@ -75,6 +86,7 @@ fn cases() -> Vec<Case> {
         Case::of("stiff spring on one node", block(), false, one.clone()),
         Case::of("stiff spring on one node, averaged pressure", block(), true, one),
         Case::of("pressed surface", block(), true, many),
+        anchored(),
         Case::of("rod", rod(0.3, 2, 40), false, gravity()),
         Case::of("incompressible rod, averaged pressure", rod(0.49, 2, 40), true, gravity()),
         Case { pressure: SurfacePressure { triangles, mpa: 1.3e-3 }, ..squeezed },

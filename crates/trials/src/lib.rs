@@ -16,6 +16,7 @@
 //! # When not to use it
 //! In an app or a simulator: nothing there may depend on this crate.
 
+pub mod calibration;
 pub mod engine;
 pub mod population;
 pub mod suites;

@@ -183,10 +183,12 @@ pub const KEYS: &[Key] = &[
         values: || {
             format!("{}; law.CLASS for one of {}", names::<Law>(), list(TissueClass::ALL.map(TissueClass::name)))
         },
-        about: "constitutive law at the same moduli; without CLASS of all tissue, not of the ventricles' fluid",
-        left_out: Some("ogden changes 2.3 of the tolerance there, takes 0.5 cores more, and none is calibrated"),
+        about: "constitutive law at the same moduli; stiffening: fitted to human brain by region; without CLASS of \
+                all tissue, not of the ventricles' fluid",
         usual: Some("neo-hookean"),
+        presets: &[(Quality::Auto, FITTED), (Quality::Fine, FITTED)],
         compared: || others::<Law>().into_iter().rev().collect(),
+        realistic: Some(FITTED),
         get: |i| Some(laws(&i.laws)),
         set: |i, text| text.split('+').try_for_each(|part| set_law(&mut i.laws, part)),
         ..Key::of(Part::Tled)
@@ -194,11 +196,12 @@ pub const KEYS: &[Key] = &[
     Key {
         name: "relaxation",
         values: names::<Relaxation>,
-        about: "stress relaxation; prony: two terms (Miller and Chinzei 2002)",
+        about: "stress relaxation; prony: two terms of swine (Miller and Chinzei 2002); solid-and-fluid: three, \
+                fitted over 4 minutes",
         usual: Some("off"),
-        presets: &[(Quality::Auto, "prony"), (Quality::Fine, "prony")],
-        compared: others::<Relaxation>,
-        realistic: Some("prony"),
+        presets: &[(Quality::Auto, "solid-and-fluid"), (Quality::Fine, "solid-and-fluid")],
+        compared: || others::<Relaxation>().into_iter().rev().collect(),
+        realistic: Some("solid-and-fluid"),
         get: |i| Some(name(&i.relaxation)),
         set: |i, text| value(text).map(|relaxation| i.relaxation = relaxation),
         ..Key::of(Part::Tled)
@@ -294,6 +297,8 @@ pub const KEYS: &[Key] = &[
 /// both assumed.
 const FRICTION_ON_TISSUE: &str = "0.1";
 const FRICTION_ON_BONE: &str = "0.3";
+/// The law that is fitted to human brain.
+const FITTED: &str = "stiffening";
 /// Total Lagrangian explicit dynamics.
 pub(super) const TLED: &str = "tled";
 /// TLED where it is faster on this machine.
@@ -577,9 +582,12 @@ mod tests {
 
     #[test]
     fn cheap_qualities_run_what_old_recordings_ran_and_others_what_matters() {
+        let mut fitted = [Law::Stiffening; TissueClass::ALL.len()];
+        fitted[TissueClass::Ventricle as usize] = Law::NeoHookean;
         let matters = Ingredients {
             element: Element::LockingFree,
-            relaxation: Relaxation::Prony,
+            laws: fitted,
+            relaxation: Relaxation::SolidAndFluid,
             friction: 0.1,
             bone_friction: 0.3,
             support: Support::Anchored,

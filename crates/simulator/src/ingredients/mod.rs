@@ -19,6 +19,7 @@ pub use variants::{Variant, of_quality, realistic, variants};
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use serde::{Serialize, Serializer};
+use trepan_measurements::fits;
 
 /// What the models of a session are made of; `None` where `--quality` chooses.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,8 +79,10 @@ pub enum Element {
 pub enum Relaxation {
     /// None: elastic.
     Off,
-    /// Prony series of two terms.
+    /// Prony series of two terms, of swine.
     Prony,
+    /// Prony series of three terms: solid, pore fluid in tens of seconds and in minutes.
+    SolidAndFluid,
 }
 
 /// What holds the brain in the skull, and what it does once the dura is open.
@@ -124,6 +127,13 @@ impl Default for Ingredients {
             folds: false,
             support: Support::Base,
         }
+    }
+}
+
+impl Relaxation {
+    /// Moduli at hand speed over those of a slow test, of which `--young-modulus-kpa` is one.
+    pub(crate) fn hand_speed_factor(self) -> f32 {
+        if self == Self::SolidAndFluid { fits::HAND_SPEED_FACTOR.f32() } else { 1.0 }
     }
 }
 

@@ -8,6 +8,7 @@
 use crate::ingredients::Ingredients;
 use crate::measure::Wanted;
 use crate::run::clock::Clock;
+use crate::tissue_class::TissueClass;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use trepan_budget::Machine;
@@ -55,7 +56,8 @@ fn ns_per_tet_step(clock: &Clock, ingredients: &Ingredients) -> f64 {
     let mesh = boxes::split_box([10; 3], Vec3::splat(100.0));
     let tets = mesh.tets.len();
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
-    let body = Body::uniform(mesh, fixed, Material::BRAIN);
+    let material = ingredients.laws[0].material(TissueClass::Brain, Material::BRAIN.young_mpa() as f32);
+    let body = Body::uniform(mesh, fixed, material);
     let config = Config { threads: 1, still_mm: 0.0, ..ingredients.config() };
     let mut solver = Tled::new(&body, &config).expect("a split box is a valid mesh");
     // A small load: under the whole weight every element of a bare box would stiffen.

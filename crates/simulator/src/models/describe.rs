@@ -3,6 +3,7 @@
 use super::Models;
 use crate::ingredients::{Ingredients, KEYS};
 use crate::measure::Parts;
+use crate::uncertainty;
 use serde::Serialize;
 use std::fmt::Display;
 use trepan_budget::{Plan, Setup};
@@ -106,6 +107,7 @@ impl Models {
             }
         }
         text += &self.describe_ingredients();
+        text += &uncertainty::limits();
         let unmet = self.unmet.iter().map(|text| format!("NOT MET: {text}\n"));
         text + &unmet.collect::<String>()
     }

@@ -30,6 +30,7 @@ use crate::program::Program;
 use crate::recipe::Recipe;
 use crate::stages::haptic_config::BONE_STIFFNESS;
 use crate::tissue_class::TissueClass;
+use crate::uncertainty;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
@@ -242,7 +243,8 @@ impl ModelRequest {
             probe_radius_mm,
             finest_mm: facts.ct_voxel_mm.unwrap_or(usual.finest_mm),
             brain_mm3: facts.brain_mm3.unwrap_or(usual.brain_mm3),
-            material: TissueClass::Brain.material(self.young_mpa),
+            material: TissueClass::Brain
+                .material(self.young_mpa * self.given.ingredients.relaxation.hand_speed_factor()),
             device_rate_hz: self.rate_hz.into(),
             picture_pixels: self.picture.map_or(usual.picture_pixels, view_pixels),
             view_mm: VIEW_MM,
@@ -337,8 +339,11 @@ fn reason<T: std::fmt::Display>(
         (false, _) => "TOO SLOW, the cheapest there is",
     };
     let by = if measured { "in this case" } else { "in cases like this" };
-    let of_force =
-        |force: &TissueForce| format!(", force {:.3} N off of {:.3} allowed", force.error_n, force.allowed_n(scene));
+    let of_force = |force: &TissueForce| {
+        let TissueForce { error_n, force_n } = *force;
+        let beside = uncertainty::beside(error_n, force_n);
+        format!(", force {error_n:.3} N off of {:.3} allowed ({beside})", force.allowed_n(scene))
+    };
     let force = force.as_ref().map(of_force).unwrap_or_default();
     let mut text = format!("{why}: error {by} {error:.3} {unit} of {tolerance} allowed{force}, {cost:.3} cores");
     for (label, neighbour) in [("better", better), ("cheaper", cheaper)] {

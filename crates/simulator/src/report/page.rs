@@ -1,6 +1,7 @@
 //! `report.html`: a self-contained page on a session with pictures, curves from the recording,
 //! scores and the machine.
 
+use crate::constants;
 use crate::error::SessionError;
 use crate::force_scale::ForceScale;
 use crate::ingredients::KEYS;
@@ -60,6 +61,9 @@ pub(crate) fn html(
         "summary": summary,
         "parts": parts(&summary.models),
         "ingredients": KEYS.iter().map(|key| format!("{} {}", key.name, key.value(&summary.models.ingredients))).collect::<Vec<_>>(),
+        "bands": summary.bands.sentences(),
+        "calibration": constants::sentence(),
+        "constants": constants::all(),
         "events": events(outcome, recording),
         "shots": shots.iter().map(shot).collect::<Vec<_>>(),
         "charts": charts(outcome, recording)?,

@@ -8,6 +8,7 @@ use crate::stages::by_cause;
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::SecondOutcome;
+use crate::uncertainty::Bands;
 use serde::Serialize;
 use std::fs;
 use trepan_contact::GuardCounters;
@@ -52,6 +53,8 @@ pub struct Summary {
     pub warnings: Vec<Raised>,
     /// Scores.
     pub scores: ScoreKeeper,
+    /// What the spread of the physical constants leaves open.
+    pub bands: Bands,
     /// Comparison of the removed bone with the plan; `null` without bone.
     pub plan: Option<PlanComparison>,
     /// Regions of the brain that were pressed, largest impulse first.
@@ -214,6 +217,7 @@ impl Summary {
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
             warnings: warnings(outcome),
             scores: outcome.scores,
+            bands: Bands::of(&outcome.scores, outcome.force_scale),
             guard: outcome.guard,
             second: outcome.second.map(|outcome| SecondSummary { outcome, ..self.second.unwrap_or_default() }),
             replay: outcome.replayed.clone(),

@@ -3,6 +3,7 @@
 use crate::program::{Phase, Program, called};
 use crate::run::View;
 use crate::stages::notice::{Notice, Warning};
+use crate::uncertainty::Band;
 use trepan_geometry::Buttons;
 use trepan_render::window::{Choice, Panel, Sound};
 
@@ -34,6 +35,11 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         value("late / held ticks", format!("{late} / {held}")),
         value("time", format!("{:.1} s", view.time_ms * 1e-3)),
     ];
+    let band = (sample.phase() == Phase::Brain && view.depth_mm[1] > 0.0).then(|| {
+        let [way_mm, depth_mm] = [-view.brain_distance_mm, view.depth_mm[1]];
+        let Band { low, high, .. } = Band::of_tissue_force(view.force.length(), way_mm, depth_mm);
+        value("force by the spread of stiffness", format!("{low:.2} to {high:.2} N"))
+    });
     let second = view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length())));
     Panel {
         case: case.into(),
@@ -48,7 +54,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         force_n: view.force.length(),
         force_limit_n: view.force_limit_n,
         choices: vec![tray(program, sample.slot)],
-        values: values.into_iter().chain(second).collect(),
+        values: values.into_iter().chain(band).chain(second).collect(),
         warnings: active(view.warnings).map(|warning| warning.text().into()).collect(),
         news: news(view),
         ..Panel::default()
@@ -112,6 +118,18 @@ mod tests {
         assert!(!late.sound.alarm && late.warnings == [Warning::TissueLate.text()]);
         assert_eq!((late.sound.spindle, late.sound.load), (0.5, 0.5));
         assert_eq!((late.choices[0].chosen, late.choices[0].options[1].0.as_str()), (1, "burr 4 mm"));
+    }
+
+    #[test]
+    fn a_press_shows_the_band_of_its_force() {
+        let mut view = View { depth_mm: [0.0, 1.0], brain_distance_mm: -4.0, ..view(0) };
+        let shown =
+            |view: &View| panel("c", Program::Integrated, view).values.iter().any(|(_, text)| text.contains(" to "));
+        assert!(!shown(&view), "a burr");
+        view.sample.tool = Program::Brain.tray()[0];
+        assert!(shown(&view));
+        view.depth_mm[1] = 0.0;
+        assert!(!shown(&view));
     }
 
     #[test]

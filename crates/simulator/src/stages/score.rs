@@ -54,6 +54,13 @@ pub struct ScoreKeeper {
     pub peak_bone_force_n: f32,
     /// Largest change of force between two ticks, N.
     pub peak_force_step_n: f32,
+    /// How far the hand was past the brain's rest surface at the largest force of the tissue, and
+    /// how deep in its present surface, mm.
+    #[serde(skip)]
+    pub(crate) peak_tissue: [f32; 2],
+    /// Force of bone on the hand while it is cut, integrated over time, N s, and that time, s.
+    #[serde(skip)]
+    pub(crate) cutting: [f64; 2],
     #[serde(skip)]
     motion: Motion,
     #[serde(skip)]
@@ -99,6 +106,10 @@ impl ScoreKeeper {
         self.times_through += u32::from(record.has(TickRecord::THROUGH));
         if record.has(TickRecord::DRILLING) {
             self.drilling_s += seconds;
+            if record.depth_mm > 0.0 {
+                let bone_n = f64::from((force - record.tissue_force).length());
+                self.cutting = [self.cutting[0] + seconds * bone_n, self.cutting[1] + seconds];
+            }
         }
         if record.phase == 0 {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
@@ -113,7 +124,10 @@ impl ScoreKeeper {
             self.tissue_s += seconds;
             self.tissue_impulse_n_s += seconds * f64::from(record.tissue_n());
             self.peak_tissue_depth_mm = self.peak_tissue_depth_mm.max(record.tissue_depth_mm);
-            self.peak_tissue_force_n = self.peak_tissue_force_n.max(record.tissue_n());
+            if record.tissue_n() > self.peak_tissue_force_n {
+                self.peak_tissue_force_n = record.tissue_n();
+                self.peak_tissue = [-record.brain_distance_mm, record.tissue_depth_mm];
+            }
         }
     }
 }

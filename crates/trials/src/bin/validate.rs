@@ -1,4 +1,5 @@
-//! `cargo xtask validate`, `merge` and `compare`: runs suites, merges shards, compares two runs.
+//! `cargo xtask validate`, `merge`, `compare` and `calibrate`: runs suites, merges shards, compares
+//! two runs, fits laws to published curves.
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
@@ -10,6 +11,7 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
+use trepan_trials::calibration;
 use trepan_trials::engine::files::whole;
 use trepan_trials::engine::part::{Part, Scope, Suite};
 use trepan_trials::engine::report::Report;
@@ -82,6 +84,15 @@ enum Task {
         #[arg(long)]
         keep_borders: bool,
     },
+    /// Fit laws to published curves, report what they predict, draw curves over data
+    Calibrate {
+        /// Write fixtures/measurements/fits.csv
+        #[arg(long)]
+        write: bool,
+        /// Folder for the curves
+        #[arg(long, value_name = "DIR", default_value = "target/calibration")]
+        out: PathBuf,
+    },
     /// Report what got faster, slower, more or less accurate from one run to another
     Compare {
         /// Folder with the SUITE.json files of the old run
@@ -103,6 +114,7 @@ fn main() -> ExitCode {
     let passed = match arguments.task {
         None => run(&arguments.run),
         Some(Task::Merge { folders, out, keep_borders }) => merge(&folders, &out, keep_borders),
+        Some(Task::Calibrate { write, out }) => calibration::run(&root(), &out, write).map(|()| true),
         Some(Task::Compare { old, new }) => compare::folders(ALL.iter().chain(ON_REQUEST), &old, &new).map(|text| {
             println!("{text}");
             true
@@ -116,6 +128,11 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// The root of the repository.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// A part to run.

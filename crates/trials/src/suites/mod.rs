@@ -18,6 +18,7 @@ mod render;
 pub mod rigid;
 mod rivals;
 mod scripted;
+mod sensitivity;
 mod simulators;
 mod thesis;
 pub mod tled;
@@ -144,6 +145,13 @@ pub const ALL: &[Suite] = &[
         chart: ("tick_p50_us", "depth_error_p95_voxel"),
         parts: rigid::parts,
         judge: rigid::judge,
+    },
+    Suite {
+        name: "sensitivity",
+        question: "which constants change the forces, times and shapes that a trainee meets, and by how much",
+        chart: ("effect_percent", "effect_deviation_percent"),
+        parts: sensitivity::parts,
+        judge: sensitivity::judge,
     },
     Suite {
         name: "simulators",

@@ -23,8 +23,8 @@ const PROBE: u64 = 600;
 
 /// Every key at once.
 const ALL: &str = "rigid=god-object-sphere,shaft=on,shading=on,bone-friction=0.3,vibration=off,element=locking-free,\
-                   law=ogden,law.grey=mooney-rivlin,relaxation=prony,threads=2,device=gpu,surface-pressure=2,\
-                   search=hashed-grid,friction=0.3,folds=on,dynamic-mass-scaling=4";
+                   law=ogden,law.grey=mooney-rivlin,relaxation=solid-and-fluid,threads=2,device=gpu,surface-pressure=2,\
+                   search=hashed-grid,friction=0.3,folds=on,dynamic-mass-scaling=4,support=anchored";
 
 /// A plate of bone 6 mm thick with a hole of 24 mm, 2 mm over a block of brain.
 fn case() -> Case {
@@ -181,10 +181,13 @@ fn each_key_that_is_physical_changes_the_force_where_it_acts_and_replays() {
         ("vibration=off", [[0.005, 0.0], [0.0; 2]]),
         ("element=locking-free", [[0.0; 2], [0.002, 0.0]]),
         ("law=ogden", [[0.0; 2], [0.002, 0.0]]),
+        ("law=stiffening", [[0.0; 2], [0.002, 0.0]]),
         ("law.grey=ogden", [[0.0; 2], [0.0002, 0.0]]),
         ("relaxation=prony", [[0.0; 2], [0.01, 0.0]]),
+        ("relaxation=solid-and-fluid", [[0.0; 2], [0.002, 0.0]]),
         ("surface-pressure=10", [[0.0; 2], [0.01, 0.0]]),
         ("friction=0.3", [[0.0; 2], [0.02, 0.0]]),
+        ("support=anchored", [[0.0; 2], [0.001, 0.0]]),
         ("search=thesis", [[0.0; 2], [0.002, 0.0]]),
         ("solver=xpbd", [[0.0; 2], [0.01, 0.0]]),
     ];

@@ -8,7 +8,7 @@ use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 /// The built-in case's files.
 pub fn inputs() -> Inputs {
     let case = trepan_fixtures::case_head();
-    let tissues = vec![TissueSource::ventricles_of_aseg(case.aseg)];
+    let tissues = TissueSource::regions_of_aseg(case.aseg);
     Inputs { name: Some(case.name), ct: Some(case.ct), mri: Some(case.mri), labels: Some(case.labels), tissues }
 }
 

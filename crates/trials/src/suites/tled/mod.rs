@@ -9,7 +9,7 @@ pub mod outside;
 mod published;
 mod region;
 pub(super) mod rivals;
-mod slender;
+pub(super) mod slender;
 mod speed;
 pub(super) mod stability;
 

@@ -127,7 +127,7 @@ fn elastic(body: &Body, positions: &[Vec3]) -> f64 {
     (0..body.mesh.tets.len()).map(of).sum()
 }
 
-/// Sag under gravity and the shift of a turned head, by dynamic relaxation, against the static
+/// Sag under gravity and the shift of a turned head, as `settle` finds them, against the static
 /// reference.
 fn relaxation(findings: &mut Findings) {
     let mesh = boxes::split_box([6, 6, 6], Vec3::splat(60.0));

@@ -297,6 +297,8 @@ fn extremes(findings: &mut Findings) {
         ("Ogden's exponent -10", damped(1.0), ogden(-10.0)),
         ("Ogden's exponent -25", damped(1.0), ogden(-25.0)),
         ("Ogden's exponent 25", damped(1.0), ogden(25.0)),
+        ("stiffening law of cortex", damped(1.0), Material::CORTEX),
+        ("stiffening law of white matter", damped(1.0), Material::CORONA_RADIATA),
     ];
     for (scene, config, material) in settings {
         let body = cube(4, material);

@@ -1,0 +1,30 @@
+//! Brain shift, sag in the closed skull, pulse and breathing, retraction.
+
+mod head;
+mod opened;
+mod retraction;
+mod sag;
+
+use crate::engine::suite::Findings;
+use crate::suites::{Part, Scope};
+use anyhow::Result;
+
+/// Lists the parts.
+pub fn parts(_: Scope) -> Vec<Part> {
+    type Makes = fn(&mut Findings) -> Result<()>;
+    let parts: [(&str, Makes); 4] = [
+        ("sag in the closed skull", sag::findings),
+        ("shift after opening", opened::shift),
+        ("pulse and breathing", opened::pulse),
+        ("retraction", retraction::findings),
+    ];
+    parts
+        .map(|(name, make)| {
+            Part::new(name, move |_, findings| {
+                if let Err(fault) = make(findings) {
+                    findings.conclusions.push(format!("{name}: not measured: {fault:#}."));
+                }
+            })
+        })
+        .into()
+}
