@@ -113,8 +113,9 @@ fn chips(findings: &mut Findings) {
     findings.series.push(Series::over("Energy against chip", ["chip, um", "energy, J/mm3"], named));
 }
 
-/// Force of the law on a tooth at one speed over that at another, m/s, with the same chip: the
-/// spindle turns as fast as both need, and volume goes with the speed.
+/// Force of the law on a tooth at a fast speed over that at a slow one, m/s, with the same chip.
+///
+/// The spindle turns as fast as both need, and volume goes with the speed.
 fn speed_ratio(slow: f64, fast: f64) -> f64 {
     let radius_mm = 3.0;
     let force = |speed: f64| {
@@ -164,8 +165,9 @@ fn slab(thick_mm: f32, hu: impl Fn(f32) -> f32) -> BoneVolume {
     BoneVolume::new(&ct, isovalue as i16).expect("a slab has bone")
 }
 
-/// Time that a tool pressed by a force, N of the task, takes in its own bore through so much dense
-/// bone, s; NaN if it does not get through in a minute.
+/// Time that a tool pressed by a force, N of the task, takes through so much dense bone, s.
+///
+/// In its own bore; NaN if it does not get through in a minute.
 fn through_s(tool: &Tool, newtons: f64, thick_mm: f32) -> f64 {
     let bone = slab(thick_mm + tool.tip_radius_mm + 1.0, |_| skull::DENSITY_OF_REFERENCE.f32());
     let mut contact = Method::RECOMMENDED.build(tool);
@@ -244,8 +246,9 @@ fn layers(findings: &mut Findings) {
     findings.series.push(Series::over(title, axes, named));
 }
 
-/// How far past the far side a drill goes that is let go a reaction time after a hand notices that
-/// the bone's force falls, mm.
+/// How far past the far side a drill goes that is let go after a reaction time, mm.
+///
+/// The time begins where a hand notices that the bone's force falls.
 fn plunge_mm(reaction_ms: f64) -> f64 {
     let (thick_mm, radius_mm) = (2.0f32, 1.5f32);
     let bone = slab(thick_mm, |_| skull::DENSITY_OF_REFERENCE.f32());
@@ -313,9 +316,10 @@ struct Chord {
     greatest_hu: f64,
 }
 
-/// Sites by their direction from the middle of the head, right, anterior and superior: midway from
-/// nasion to coronal suture, parietal eminence, anterior temporal bone, midway from mastoid to
-/// occipital protuberance, temporal squama.
+/// Sites by their direction from the middle of the head, right, anterior and superior.
+///
+/// Midway from nasion to coronal suture, parietal eminence, anterior temporal bone, midway from
+/// mastoid to occipital protuberance, temporal squama.
 const SITES: [[f64; 3]; 5] =
     [[0.0, 1.0, 0.5], [0.8, -0.35, 0.6], [1.0, 0.35, -0.2], [0.5, -1.0, -0.4], [1.0, 0.1, -0.2]];
 /// How far the middle of the head lies under its top, mm.

@@ -14,6 +14,7 @@
 //! The swept volume is counted twice: as the method says, and in the bone that is left, at 64 or
 //! 512 points a voxel where the density, trilinear between voxels, and the cut, a spline between
 //! its nodes, both say so. No front is asked for: the law of removal is the same for all.
+//! Burrs cut by the law without edges: edges that rub leave what a hand does not press enough for.
 
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
