@@ -10,8 +10,8 @@
 //!
 //! # Practice
 //! The share is [`ForceScale::of`] the device's greatest force unless `--force-scale` gives
-//! another; it stands in the recording's header, so that a replay has the same loads. Stiffness, damping and
-//! the force guard are those of the hand: the scale does not affect stability.
+//! another; it stands in the recording's header, so that a replay has the same loads. Stiffness,
+//! damping and the force guard are those of the hand: the scale does not affect stability.
 
 use trepan_link::wire::TickRecord;
 use trepan_measurements::hands;
