@@ -29,7 +29,7 @@ const TABLE: f32 = 0.25;
 /// Bone begins here, HU.
 const ISOVALUE: i16 = 400;
 /// A tick, ms: the law of removal does not depend on it.
-const TICK_MS: f32 = 8.0;
+const TICK_MS: f32 = 16.0;
 /// Time after which a burr counts as not coming through, ms.
 const LONGEST_MS: f32 = 60_000.0;
 /// The steady feed, mm/ms.
