@@ -90,7 +90,7 @@ impl Settling {
     }
 
     /// Makes the loads of a brain whose fluid drains until the share `lost` of its buoyancy is gone.
-    /// `up` is the unit vector against gravity; it drains `speed_up` times as fast as in a patient.
+    /// `up`: unit vector against gravity. The fluid drains `speed_up` times as fast as in a patient.
     pub fn draining(brain: &TetMesh, up: Vec3, lost: f32, speed_up: f32) -> Self {
         let time_ms = support::DRAIN_TIME.value * 60e3 / f64::from(speed_up);
         let levels_mm = levels(brain, up, lost);

@@ -3,7 +3,8 @@
 //! # Theory
 //! Over minutes tissue is at rest under its loads at every moment, with the stress that relaxation
 //! has left by then. After a time t the share `Σ g_i (1 - e^(-t/τ_i))` of the stress has relaxed; a
-//! solver whose whole relaxation is that share comes to rest under the same moduli whatever the law. What a load of changing size does before t counts as if it had acted for t.
+//! solver whose whole relaxation is that share comes to rest under the same moduli whatever the
+//! law. What a load of changing size does before t counts as if it had acted for t.
 //!
 //! # Practice
 //! Contact with the skull is found anew in each round; a state takes some
