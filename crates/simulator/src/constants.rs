@@ -110,6 +110,7 @@ const USED: &[&str] = &[
     "support/breathing-weight",
     "support/breathing-weight-frequency",
     "support/csf-loss",
+    "support/csf-loss-uniform",
     "support/drain-speed-up",
     "support/drain-time",
     "support/falx-depth",

@@ -40,8 +40,8 @@ pub struct Options {
     /// walls are softened by the same factor
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,
-    /// Newtons at the hand per newton of the task, on bone [default: the device's greatest force
-    /// over the 24 N with which people press a drill, at most 1; a replay's as recorded]
+    /// Newtons at the hand per newton of the task, on bone. People press a drill with up to 24 N
+    /// [default: the device's greatest force over that, at most 1; a replay's as recorded]
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub force_scale: Option<f32>,
     /// Let other processes on this machine watch this session under this name
@@ -109,7 +109,7 @@ pub struct Options {
     /// 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
-    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1: the brain sinks
+    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1. The brain sinks
     /// [default: 0.4, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
     #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,

@@ -3,9 +3,9 @@
 //!
 //! # Theory
 //! Outputs: the time until it comes through under the load, at most a minute, and the mean force at
-//! the feed once the ball is in the bone, to a millimetre before the far side; a hand that would need
-//! more than people give counts as giving that. Newtons are those of the task; contact and removal
-//! are those of the default method.
+//! the feed once the ball is in the bone, to a millimetre before the far side. A hand that would
+//! need more than people give counts as giving that. Newtons are those of the task; contact and
+//! removal are those of the default method.
 
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
