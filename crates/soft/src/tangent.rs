@@ -1,9 +1,10 @@
 //! Tangent stiffness of a deformed body, factored: Newton steps for solvers that only know forces.
 //!
 //! # Theory
-//! Block (a, b) of an element is `V (∂P/∂F : e_c ⊗ ∇N_b) ∇N_a`, by columns c. A pressing spring adds
-//! `k v vᵀ`, `v = w ⊗ n`: to the matrix where it holds one node, else as a rank-one term (Sherman
-//! and Morrison 1950). A shift on the diagonal grows until the matrix is positive definite.
+//! Block (a, b) of an element is `V (∂P/∂F : e_c ⊗ ∇N_b) ∇N_a`, by columns c. A pressing spring
+//! adds `k v vᵀ`, `v = w ⊗ n`: to the matrix where it holds one node, else as a rank-one term
+//! (Sherman and Morrison 1950). A shift on the diagonal grows until the matrix is positive
+//! definite.
 //!
 //! With averaged pressure the volume change J̄ of a node group s, the elements of one material
 //! around a node, has the gradient `b = Σ_e V_e/(4 V_s) cof F ∇N_a`. The group adds `κ V_s b bᵀ`;
@@ -90,8 +91,8 @@ impl Tangent {
         })
     }
 
-    /// Assembles and factors the tangent at displacements `u`, mm, with the anchors that hold and the
-    /// springs that press there. False when no shift made it positive definite.
+    /// Assembles and factors the tangent at displacements `u`, mm, with the anchors that hold and
+    /// the springs that press there. False when no shift made it positive definite.
     pub fn factor(&mut self, u: &[DVec3], loads: &Loads) -> bool {
         let depth_mm = |contact: &NodalContact| -> f64 {
             let along = |(n, w): (usize, f64)| w * (self.rest[n] + u[n]).dot(contact.normal.as_dvec3());
@@ -284,7 +285,8 @@ mod tests {
         }
     }
 
-    /// A volume change that is the same everywhere is its own average: both elements resist it alike.
+    /// A volume change that is the same everywhere is its own average: both elements resist it
+    /// alike.
     #[test]
     fn averaged_pressure_softens_all_but_an_even_change_of_volume() {
         let body = Body { fixed: vec![0], ..block() };

@@ -309,8 +309,8 @@ impl Nodes {
         self.v.set(place, velocity.extend(0.0).to_array());
     }
 
-    /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, and the force of its
-    /// anchor, N; zero for a fixed node.
+    /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, and the force of
+    /// its anchor, N; zero for a fixed node.
     pub fn force_at_rest(&self, place: usize, gravity: Vec3, fluid: &Fluid) -> Vec3 {
         if self.inverse_mass[place] == 0.0 {
             return Vec3::ZERO;

@@ -4,17 +4,17 @@
 //! The residual r is the force on the free nodes: elements, weight, contact springs, pressure. A
 //! step is `d = B r`. B starts from the factored tangent of the same laws on plain elements
 //! ([`Tangent`]) and is corrected by the last changes of displacement and residual (limited-memory
-//! BFGS: Nocedal 1980). So what the tangent leaves out is learnt: averaged pressure, relaxed stress,
-//! pressure that follows the surface. A line search on `r·d` shortens a step after which the
-//! residual points back.
+//! BFGS: Nocedal 1980). So what the tangent leaves out is learnt: averaged pressure, relaxed
+//! stress, pressure that follows the surface. A line search on `r·d` shortens a step after which
+//! the residual points back.
 //!
 //! Near rest d is the way that is left. If steps shrink by the factor ρ, `|d|/(1 - ρ)` bounds it.
 //! Where rounding of the f32 forces keeps d from shrinking, the way left is the largest d of the
 //! last iterations.
 //!
 //! # Practice
-//! About 10 to 40 evaluations of the forces, each at the cost of a step of motion, and about as many
-//! solutions of the factored tangent. A slender body takes a thousandth of the steps that motion
+//! About 10 to 40 evaluations of the forces, each at the cost of a step of motion, and about as
+//! many solutions of the factored tangent. A slender body takes a thousandth of the steps that motion
 //! damped to rest takes. Tissue that relaxes ends fully relaxed.
 
 use crate::tled::Tled;
@@ -29,11 +29,11 @@ const MEMORY: usize = 20;
 const STEEPEST: f64 = 0.3;
 /// Gradient of a step above which elements turn so far that the residual does not judge it.
 const TURNING: f64 = 0.05;
-/// Gradient of steps that are near rest or rounding: elements that strain more may hold back, by
+/// Gradient of steps that are near rest or rounding. Elements that strain more may hold back, by
 /// tension of their own, what has far to go.
 const FLAT: f64 = 1e-3;
-/// Gradient of the displacement since the tangent was factored, above which that is done anew if
-/// steps shrink slowly, and above which it always is.
+/// Gradient of the displacement since the tangent was factored, above which it is factored anew.
+/// `OLD` holds if steps shrink slowly, `FAR` always.
 const OLD: f64 = 0.01;
 const FAR: f64 = 0.1;
 /// Share of the step before that a step must be below, not to be slow.
@@ -44,8 +44,8 @@ const SURE: usize = 4;
 const STALLED: usize = 12;
 /// Most evaluations of one line search.
 const TRIALS: u32 = 8;
-/// Share of the slope along a step, backwards, that is borne at its end.
-const BORNE: f64 = 0.9;
+/// Share of the slope along a step, backwards, that is accepted at its end.
+const ACCEPTED: f64 = 0.9;
 /// Bulk over shear modulus above which plain elements lock: 10 is a Poisson's ratio of 0.452.
 const LOCKING: f64 = 10.0;
 /// Way left over the step where the tangent is that of plain elements and pressure is averaged:
@@ -100,8 +100,8 @@ struct State {
 }
 
 impl Tled {
-    /// Moves the body to equilibrium under `loads`, with zero velocities. A body without supports is
-    /// not moved, and `converged` is false.
+    /// Moves the body to equilibrium under `loads`, with zero velocities. A body without supports
+    /// is not moved, and `converged` is false.
     ///
     /// Allocates; not for a loop that must keep a rate.
     pub fn settle(&mut self, loads: &Loads, settling: &Settling) -> Settled {
@@ -162,8 +162,8 @@ impl Tled {
         settled
     }
 
-    /// Whether plain elements of some material lock, so that their tangent is of no use for averaged
-    /// pressure.
+    /// Whether plain elements of some material lock, so that their tangent is of no use for
+    /// averaged pressure.
     fn locks(&self) -> bool {
         self.body.materials.iter().any(|material| material.bulk_mpa() > LOCKING * material.shear_mpa())
     }
@@ -187,7 +187,7 @@ impl Tled {
             let next = self.evaluate(u, loads, settled);
             let ahead = dot(&next.residual, step);
             let sound = ahead.is_finite() && settled.last.inverted <= inverted;
-            if sound && (turns || ahead >= -BORNE * slope) {
+            if sound && (turns || ahead >= -ACCEPTED * slope) {
                 return Some(next);
             }
             share *= if sound { (slope / (slope - ahead)).clamp(0.1, 0.5) } else { 0.25 };

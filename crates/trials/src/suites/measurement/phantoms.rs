@@ -4,10 +4,10 @@
 //! The rod's law and density are those that its experimenters state; its shape is computed.
 //!
 //! A cube is pulled one way, `F = diag(λ, t, t)` on its two ends, or two ways alike,
-//! `F = diag(λ, λ, t)` on its four sides, t such that no force is left across the pull; the force on
-//! an end over its area at rest is the nominal stress. Ogden's law with one term goes through the
-//! stresses at two stretches of a tension test. All other stretches, and those of the pull two ways,
-//! are predicted.
+//! `F = diag(λ, λ, t)` on its four sides, t such that no force is left across the pull. The force
+//! on an end over its area at rest is the nominal stress. Ogden's law with one term goes through
+//! the stresses at two stretches of a tension test. All other stretches, and those of the pull two
+//! ways, are predicted.
 
 use super::comparison::{Comparison, How};
 use crate::engine::picture::Series;
