@@ -93,8 +93,10 @@ impl Row {
         format!("{}/{}", self.table.replace('_', "-"), self.key)
     }
 
-    /// Factor by which the value may be larger or smaller: one standard deviation where a spread
-    /// was given, else [`NO_SPREAD`] for a measured value and [`NOT_MEASURED`] for any other.
+    /// Factor by which the value may be larger or smaller.
+    ///
+    /// One standard deviation where a spread was given, else [`NO_SPREAD`] for a measured value and
+    /// [`NOT_MEASURED`] for any other.
     pub fn factor(&self) -> f64 {
         let share = self.relative_spread();
         match share.is_finite() {

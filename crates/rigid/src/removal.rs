@@ -43,16 +43,16 @@
 //!
 //! # Sources
 //! J. F. Archard, *Contact and rubbing of flat surfaces*, J. Appl. Phys. 24 (1953). Edge and chip
-//! forces: Y. Altintas, *Manufacturing automation*, 2012, measured on bone by a saw tooth in Med Eng
-//! Phys 35:1638. Classes D1 to D4 by CT number: C. E. Misch, *Contemporary implant dentistry*, 1999.
-//! Numbers: tables `drilling`, `skull` and `hands` of `trepan-measurements`, each with its source or
-//! as uncalibrated. The burr's own energy and edge are **fitted to forces and times of hands**, not
-//! measured on a burr.
+//! forces: Y. Altintas, *Manufacturing automation*, 2012, measured on bone by a saw tooth in Med
+//! Eng Phys 35:1638. Classes D1 to D4 by CT number: C. E. Misch, *Contemporary implant dentistry*,
+//! 1999. Numbers: tables `drilling`, `skull` and `hands` of `trepan-measurements`, each with its
+//! source or as uncalibrated. The burr's own energy and edge are **fitted to forces and times of
+//! hands**, not measured on a burr.
 //!
 //! # When not to use it
 //! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and
-//! nothing physical drives it. For the force of a light touch: the length of edge that cuts does not
-//! fall with the area of the contact.
+//! nothing physical drives it. For the force of a light touch: the length of edge that cuts does
+//! not fall with the area of the contact.
 
 use crate::spindle::{Spindle, per_ms};
 use trepan_geometry::{Tool, ToolKind};
@@ -68,8 +68,9 @@ const CORTICAL_HU: f32 = skull::DENSITY_CORTICAL.f32();
 /// Micrometres in a millimetre.
 const UM: f32 = 1e-3;
 
-/// Newtons at the hand per newton of the task, of a hand that no device limits: the greatest
-/// published force on a drill becomes the Touch's peak.
+/// Newtons at the hand per newton of the task, of a hand that no device limits.
+///
+/// The greatest published force on a drill becomes the Touch's peak.
 pub const FORCE_SCALE: f32 = devices::TOUCH_PEAK_FORCE.f32() / hands::DRILLING_PEAK_GREATEST.f32();
 
 /// A cutter and its motor.
@@ -110,7 +111,8 @@ impl Cutter {
         pole_share: drilling::BURR_POLE_SHARE.f32(),
     };
 
-    /// A cutter of constant specific energy, as versions before 0.3 had it: uncalibrated.
+    /// A cutter of constant specific energy, as versions before 0.3 had it. For their recordings
+    /// its uncalibrated constants are numerical parameters.
     pub const CONSTANT: Self = Self {
         spindle: Spindle { power_w: 30.0, ..Spindle::DRILL },
         cutting_ratio: 0.3,
@@ -178,8 +180,8 @@ pub enum RemovalLaw {
         cancellous_share: f32,
         /// Stiffness that turns depth into load, newtons of the task per mm.
         stiffness: f32,
-        /// Load beyond which pressing harder cuts no faster, newtons of the task; it still slows the
-        /// spindle.
+        /// Load beyond which pressing harder cuts no faster, newtons of the task; it still slows
+        /// the spindle.
         max_load_n: f32,
     },
 }
@@ -197,8 +199,10 @@ impl RemovalLaw {
         max_load_n: hands::DRILLING_PEAK_GREATEST.f32(),
     };
 
-    /// The law of versions before 0.3, which recordings of them ran with: constant specific energy,
-    /// and the hand's newtons as those of the task.
+    /// The law of versions before 0.3, which recordings of them ran with.
+    ///
+    /// Constant specific energy, and the hand's newtons as those of the task. Its constants are
+    /// numerical parameters.
     pub const CONSTANT_ENERGY: Self = Self::Rate {
         cutter: Cutter::CONSTANT,
         perforator: Cutter::CONSTANT,
@@ -207,8 +211,8 @@ impl RemovalLaw {
         max_load_n: 20.0,
     };
 
-    /// This law at a hand whose contact has `stiffness`, N/mm, and that gets `scale` newtons for one
-    /// of the task.
+    /// This law at a hand whose contact has a stiffness, N/mm, and that gets `scale` newtons for
+    /// one of the task.
     pub fn with_hand(self, hand_stiffness: f32, scale: f32) -> Self {
         match self {
             Self::Rate { cutter, perforator, cancellous_share, max_load_n, .. } => {

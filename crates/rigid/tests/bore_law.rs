@@ -47,8 +47,9 @@ fn fed(voxel_mm: f32, axis: Vec3, radius: f32, dt_ms: f32) -> Fed {
     Fed { depth: (mean, spread.sqrt()), change, volume }
 }
 
-/// The depth at which the law takes a cylinder of the burr's width at the speed of the feed, mm,
-/// along a way whose cosine with the tool's axis is given.
+/// The depth at which the law takes a cylinder of the burr's width at the speed of the feed, mm.
+///
+/// `cosine` is that between the way and the tool's axis.
 fn steady(radius_mm: f32, cosine: f32) -> f32 {
     let wanted = PRICE * std::f32::consts::PI * radius_mm * radius_mm * FEED_MM_PER_MS;
     let (mut low, mut high) = (0.0, 3.0);

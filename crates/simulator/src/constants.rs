@@ -110,6 +110,7 @@ const USED: &[&str] = &[
     "support/breathing-weight",
     "support/breathing-weight-frequency",
     "support/csf-loss",
+    "support/csf-loss-uniform",
     "support/drain-speed-up",
     "support/drain-time",
     "support/falx-depth",
@@ -268,7 +269,8 @@ mod tests {
         let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
         // A table may have another name in a source: `use ...::table as name`.
         let names = |text: &str, table: &str| -> Vec<String> {
-            let renamed = text.split(&format!("{table} as ")).skip(1);
+            let marker = format!("{table} as ");
+            let renamed = text.split(&marker).skip(1);
             let name = |rest: &str| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().map(String::from);
             renamed.filter_map(name).chain([table.to_string()]).collect()
         };

@@ -9,9 +9,9 @@
 //! 0.5 N, are sent as they are.
 //!
 //! # Practice
-//! The share is [`ForceScale::of`] the device's greatest force unless `--force-scale` gives another;
-//! it stands in the recording's header, so that a replay has the same loads. Stiffness, damping and
-//! the force guard are those of the hand: the scale does not affect stability.
+//! The share is [`ForceScale::of`] the device's greatest force unless `--force-scale` gives
+//! another; it stands in the recording's header, so that a replay has the same loads. Stiffness,
+//! damping and the force guard are those of the hand: the scale does not affect stability.
 
 use trepan_link::wire::TickRecord;
 use trepan_measurements::hands;
@@ -24,8 +24,8 @@ impl ForceScale {
     /// Range of `--force-scale`.
     pub const RANGE: [f64; 2] = [0.01, 1.0];
 
-    /// The scale at which the greatest published force on a drill is the greatest, N, of a device; 1
-    /// for a device that gives it.
+    /// The scale at which the greatest published force on a drill is the greatest, N, of a device;
+    /// 1 for a device that gives it.
     pub fn of(greatest_n: f32) -> Self {
         Self((greatest_n / hands::DRILLING_PEAK_GREATEST.f32()).clamp(Self::RANGE[0] as f32, 1.0))
     }

@@ -178,8 +178,8 @@ const SCALE: &str = "scale";
 const FORCE_SCALE: &str = "force_scale";
 
 impl DeviceLimits {
-    /// Properties of an open device whose motion is multiplied by `scale`. The force scale is that of
-    /// its greatest force unless one is given.
+    /// Properties of an open device whose motion is multiplied by `scale`. The force scale is that
+    /// of its greatest force unless one is given.
     pub fn of(device: &Capabilities, scale: f32, force_scale: Option<f32>) -> Self {
         let position_resolution_mm = scale * device.position_resolution_mm;
         let greatest_n = device.guard_config().max_force_n;

@@ -9,8 +9,6 @@ use trepan_measurements::{brain_living, support};
 
 /// Default diameter of the flap that script `flap` cuts, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
-/// Default share of the fluid's buoyancy that is lost when the dura is opened.
-const CSF_LOSS: f32 = support::CSF_LOSS.f32();
 /// Default factor by which the fluid drains faster than in a patient.
 const CSF_SPEED_UP: f32 = support::DRAIN_SPEED_UP.f32();
 /// Default Young's modulus of the brain in a slow test, kPa.
@@ -23,8 +21,9 @@ const RATE_HZ: f32 = 1000.0;
 pub(crate) struct Operation {
     /// Diameter of the planned flap, mm; 0 for a burr hole alone.
     pub flap_mm: f32,
-    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1.
-    pub csf_loss: f32,
+    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1; `None`: by what
+    /// holds the brain.
+    pub csf_loss: Option<f32>,
     /// Factor by which the fluid drains faster than in a patient, 1 to 1000.
     pub csf_speed_up: f32,
     /// Tissue classes that raise a warning when a tool comes close.
@@ -54,10 +53,7 @@ impl Operation {
         };
         Self {
             flap_mm: flap.unwrap_or(0.0),
-            csf_loss: options
-                .csf_loss
-                .or_else(|| number("csf_loss").or_else(|| number("fluid_lost")))
-                .unwrap_or(CSF_LOSS),
+            csf_loss: options.csf_loss.or_else(|| number("csf_loss")).or_else(|| number("fluid_lost")),
             csf_speed_up: options
                 .csf_speed_up
                 .or_else(|| within("csf_speed_up", CSF_SPEED_UPS))
@@ -81,7 +77,7 @@ impl Operation {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
             ("flap_mm".into(), self.flap_mm.to_string()),
-            ("csf_loss".into(), self.csf_loss.to_string()),
+            ("csf_loss".into(), self.csf_loss.map_or_else(String::new, |share| share.to_string())),
             ("csf_speed_up".into(), self.csf_speed_up.to_string()),
             ("forbidden".into(), forbidden.join(",")),
             ("young_modulus_kpa".into(), self.young_kpa.to_string()),
@@ -102,7 +98,7 @@ mod tests {
         let parse = |line: &str| Options::try_parse_from(line.split(' ')).unwrap();
         let script = DeviceName::scripted("flap");
         let usual = Operation::of(&parse("x"), &DeviceName::MOUSE, None);
-        assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, CSF_LOSS, &[TissueClass::Vessel][..]));
+        assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, None, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
         let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --rate-hz 500 --watch other";
         let given = Operation::of(&parse(line), &script, None);
@@ -113,10 +109,10 @@ mod tests {
         assert_eq!(Operation::of(&parse("x"), &DeviceName::MOUSE, Some(&recording)), given);
         assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);
         let older = |line: &str| Operation::of(&parse(line), &script, Some(&recording)).csf_loss;
-        assert_eq!((older("x"), older("x --fluid-lost 0.2")), (0.0, 0.2), "the flag of version 0.1");
+        assert_eq!((older("x"), older("x --fluid-lost 0.2")), (Some(0.0), Some(0.2)), "the flag of version 0.1");
         let lost = recording.header.config.remove("csf_loss").unwrap();
         recording.header.config.insert("fluid_lost".into(), lost);
-        assert_eq!(Operation::of(&parse("x"), &script, Some(&recording)).csf_loss, 0.0, "the key of version 0.1");
+        assert_eq!(Operation::of(&parse("x"), &script, Some(&recording)).csf_loss, Some(0.0), "the key of version 0.1");
         recording.header.config.insert("rate_hz".into(), "0".into());
         assert_eq!(
             Operation::of(&parse("x"), &script, Some(&recording)).rate_hz,

@@ -40,7 +40,7 @@ pub struct Options {
     /// walls are softened by the same factor
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,
-    /// Newtons at the hand per newton of the task, on bone: people press a drill with up to 24 N
+    /// Newtons at the hand per newton of the task, on bone. People press a drill with up to 24 N
     /// [default: the device's greatest force over that, at most 1; a replay's as recorded]
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub force_scale: Option<f32>,
@@ -101,16 +101,16 @@ pub struct Options {
     /// exit
     #[arg(long)]
     pub list_constants: bool,
-    /// Young's modulus of the brain in a slow test, kPa; relaxation solid-and-fluid makes it stiffer
-    /// at hand speed [default: 3; a replay's as recorded]
+    /// Young's modulus of the brain in a slow test, kPa; with relaxation solid-and-fluid it is
+    /// stiffer at hand speed [default: 3; a replay's as recorded]
     #[arg(long, value_name = "KPA", allow_negative_numbers = true)]
     pub young_modulus_kpa: Option<f32>,
     /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default:
     /// 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
-    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1: the brain sinks
-    /// [default: 0.05, fitted to the shift of 61 patients]
+    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1. The brain sinks
+    /// [default: 0.4, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
     #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,
     /// How much faster than in a patient the fluid drains, 1 to 1000 [default: 60, a minute for an
@@ -159,8 +159,9 @@ pub struct Patient {
     /// Label volume of the brain: all nonzero voxels [default: segmented from the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
-    /// Tissue class from a label volume: white, grey, ventricle, tumour or vessel; all nonzero
-    /// voxels inside the brain, or only the codes. Repeatable
+    /// Tissue class from a label volume: white, grey, ventricle, tumour, vessel, basal-ganglia,
+    /// corpus-callosum or soft-tumour; all nonzero voxels inside the brain, or only the codes.
+    /// Repeatable
     #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
     pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]

@@ -19,11 +19,11 @@ use crate::stages::haptic_tick::HapticStage;
 use crate::stages::second_hand::SecondHand;
 use crate::stages::settling::Settling;
 use crate::stages::solver_step::SolverStage;
-use crate::tissue_class::TissueClass;
 use std::sync::{Arc, OnceLock};
 use trepan_budget::Bone;
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
+use trepan_measurements::support;
 use trepan_mesh::TetMesh;
 use trepan_rigid::{Extent, Method};
 use trepan_soft::Body;
@@ -63,7 +63,7 @@ impl SessionSetup {
         scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
         let copy = |bone: &Arc<BoneVolume>| BoneVolume::new(&bone.snapshot(), bone.isovalue()).map(Arc::new);
         let filmed = scene.bone.as_ref().filter(|_| filmed).map(copy).transpose();
-        Ok(Self {
+        let mut setup = Self {
             program,
             plan: planned(&scene, &operation)?,
             young_mpa: units::mpa_from_kpa(operation.young_kpa),
@@ -72,7 +72,10 @@ impl SessionSetup {
             models,
             filmed: filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?,
             ran: OnceLock::new(),
-        })
+        };
+        let usual = if setup.is_anchored() { support::CSF_LOSS } else { support::CSF_LOSS_UNIFORM };
+        setup.operation.csf_loss.get_or_insert(usual.f32());
+        Ok(setup)
     }
 
     /// The bone, if the program drills it.
@@ -157,14 +160,19 @@ impl SessionSetup {
         Ok(Method::named(method).ok_or_else(unknown)?.with_points(points))
     }
 
-    /// What holds the brain, and the loads on it once the dura is open.
-    fn held(&self, brain: &RestBrain, with: &Ingredients) -> Result<(Held, Settling), SessionError> {
-        let Operation { csf_loss, csf_speed_up, .. } = self.operation;
+    /// Whether the brain is held by its anchors in a skull: rival solvers have none.
+    fn is_anchored(&self) -> bool {
         let is_rival = trepan_soft::Method::named(self.models.setup.tissue.solver).is_some();
+        self.bone().is_some() && self.models.ingredients().support == Support::Anchored && !is_rival
+    }
+
+    /// What holds the brain, and the loads on it once the dura is open.
+    fn held(&self, brain: &RestBrain) -> Result<(Held, Settling), SessionError> {
+        let csf_loss = self.operation.csf_loss.unwrap_or_default();
         let outward = -self.plan.site.inward;
-        match self.bone().filter(|_| with.support == Support::Anchored && !is_rival) {
+        match self.bone().filter(|_| self.is_anchored()) {
             Some(bone) => {
-                let settling = Settling::draining(&brain.mesh, outward, csf_loss, csf_speed_up);
+                let settling = Settling::draining(&brain.mesh, outward, csf_loss, self.operation.csf_speed_up);
                 brain.held_in_skull(Arc::clone(bone), &self.plan).map(|held| (held, settling))
             }
             None => {
@@ -176,13 +184,12 @@ impl SessionSetup {
     }
 
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
-        let (Held { fixed, anchors, mut wall }, settling) = self.held(brain, with)?;
-        let young_mpa = self.young_mpa * with.relaxation.hand_speed_factor();
+        let (Held { fixed, anchors, mut wall }, settling) = self.held(brain)?;
         let body = Body {
             mesh: brain.mesh.clone(),
             fixed,
             anchors,
-            materials: TissueClass::ALL.map(|class| with.laws[class as usize].material(class, young_mpa)).to_vec(),
+            materials: with.materials(self.young_mpa),
             material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;

@@ -17,7 +17,7 @@ use trepan_budget::Tissue;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_measurements::pulse;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
+use trepan_soft::{Body, BodyError, Loads, Material, SoftSolver, SurfacePressure};
 use trepan_tled::gpu::WithSpare;
 use trepan_tled::{Config, Settled, Settling, Tled, choice};
 
@@ -113,17 +113,28 @@ fn refused(fault: BodyError) -> SessionError {
 }
 
 impl Ingredients {
+    /// Material of every tissue class, in their order, for a Young's modulus of brain, MPa.
+    pub fn materials(&self, young_mpa: f32) -> Vec<Material> {
+        let young_mpa = young_mpa * self.relaxation.hand_speed_factor();
+        TissueClass::ALL.map(|class| self.laws[class as usize].material(class, young_mpa)).to_vec()
+    }
+
+    /// Stress relaxation.
+    pub fn relaxation(&self) -> trepan_tled::Relaxation {
+        match self.relaxation {
+            Relaxation::Off => trepan_tled::Relaxation::NONE,
+            Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
+            Relaxation::SolidAndFluid => trepan_tled::Relaxation::SOLID_AND_FLUID,
+        }
+    }
+
     /// Settings of TLED.
     pub(crate) fn config(&self) -> Config {
         Config {
             mass_scaling: MASS_ADDED,
             dynamic_mass_scaling: self.dynamic_mass_scaling,
             averaged_pressure: self.element == Element::LockingFree,
-            relaxation: match self.relaxation {
-                Relaxation::Off => trepan_tled::Relaxation::NONE,
-                Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
-                Relaxation::SolidAndFluid => trepan_tled::Relaxation::SOLID_AND_FLUID,
-            },
+            relaxation: self.relaxation(),
             threads: self.threads.unwrap_or(1),
             still_mm: if self.steps_all() { 0.0 } else { self.still_mm },
             ..Config::default()
@@ -236,7 +247,7 @@ mod tests {
         for law in [Law::StVenantKirchhoff, Law::MooneyRivlin, Law::Ogden, Law::Stiffening] {
             let (is, _) = pressed(&Ingredients { laws: [law; TissueClass::ALL.len()], ..plain.clone() });
             let change = (is[1] / usual[1] - 1.0).abs();
-            assert!((1e-4..0.5).contains(&change), "{law:?}: {is:?} of {usual:?}");
+            assert!((1e-4..1.0).contains(&change), "{law:?}: {is:?} of {usual:?}");
         }
     }
 

@@ -77,8 +77,8 @@ impl TissueClass {
         }
     }
 
-    /// Neo-Hookean material of the class for a Young's modulus of brain, MPa: the presets of `soft`,
-    /// scaled by one factor.
+    /// Neo-Hookean material of the class for a Young's modulus of brain, MPa. The presets of `soft`
+    /// are scaled by one factor.
     ///
     /// A vessel is ten times as stiff as brain. Its wall is stiffer ([`Material::VESSEL_WALL`]),
     /// but would shorten the stable time step many times.
@@ -99,9 +99,9 @@ impl TissueClass {
         Material::NeoHookean { young_mpa, poisson, density_g_mm3: Material::BRAIN.density_g_mm3() }
     }
 
-    /// Material of the class by the law that is fitted to human brain, for a Young's modulus of
-    /// brain, MPa: regions as soft against each other as they were measured. A ventricle is fluid
-    /// and has no such law.
+    /// Material of the class by the law fitted to human brain, for a Young's modulus of brain, MPa.
+    /// Regions are as soft against each other as they were measured. A ventricle is fluid and has
+    /// no such law.
     pub fn stiffening(self, brain_mpa: f32) -> Material {
         let plain = self.material(brain_mpa);
         let Material::Stiffening { share, bound, poisson, density_g_mm3, .. } = self.preset() else { return plain };

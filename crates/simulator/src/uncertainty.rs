@@ -50,8 +50,9 @@ impl Band {
         Self { value, low: value / factor, high: value * factor }
     }
 
-    /// Band of a force of tissue, N, on a tool whose hand stands `way_mm` past the rest surface and
-    /// `depth_mm` of that in the tissue's present surface.
+    /// Band of a force of tissue, N.
+    ///
+    /// The hand stands `way_mm` past the rest surface, `depth_mm` of that in the present one.
     pub(crate) fn of_tissue_force(force_n: f32, way_mm: f32, depth_mm: f32) -> Self {
         let power = ((way_mm - depth_mm) / way_mm).clamp(0.0, 1.0);
         // Tissue that moved towards the tool, or an unknown way: the widest band.
@@ -135,8 +136,7 @@ mod tests {
     use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
     use trepan_tled::{Config, Settling, Tled};
 
-    /// Force of a block of brain, N, 30 mm wide, on a hand 5 mm past its surface, and how far the
-    /// surface gave way, mm.
+    /// Force of a block on a hand 5 mm past its surface, N, and how far that gave way, mm.
     fn pressed(material: Material) -> [f32; 2] {
         let mesh = boxes::centred_box([4; 3], Vec3::splat(30.0));
         let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);

@@ -195,8 +195,8 @@ impl Material {
     /// magnetic resonance elastography.
     pub const SOFT_TUMOUR: Self = neo_hookean(living::YOUNG_MODULUS.f32() * tissue::SOFT_TUMOUR_RATIO.f32());
 
-    /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more
-    /// compressible than living brain; numerical, to compare with it.
+    /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3. It is ten times stiffer and far
+    /// more compressible than living brain; numerical, to compare with it.
     pub const THESIS: Self = Self::NeoHookean { young_mpa: 0.030, poisson: 0.3, density_g_mm3: 1.0e-3 };
 
     /// Refuses parameters that no material has, and fits that are not convex.

@@ -20,6 +20,11 @@
 //! Form chosen here for the curves of Budday et al., Acta Biomater. 48 (2017), 319-340, tension,
 //! compression and shear at once. Cross product of matrices: Bonet, Gil and Ortigosa, Comput.
 //! Methods Appl. Mech. Eng. 283 (2015).
+//!
+//! # When not to use it
+//! Where bodies are crushed flat: a block comes back from 30 % of its height, as it does not with
+//! Ogden's law, but not from a twentieth, from which a neo-Hookean one does
+//! (`cargo test -p trepan-tled --test materials`).
 
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power};
 use glam::DMat3;

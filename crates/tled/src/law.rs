@@ -11,8 +11,8 @@
 //! ```
 //! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3;
 //! Q is the power of cofᵀF cof F in `stiffening.rs` of `trepan-soft`, ⨯ the cross product of
-//! symmetric matrices; `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1. Its reasons stand in
-//! `trepan_soft::Law`, the f64 version of this file.
+//! symmetric matrices; `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1.
+//! Its reasons stand in `trepan_soft::Law`, the f64 version of this file.
 
 use crate::principal::{Symmetric, principal};
 use crate::symmetric::{cross, gram, scale, square, trace, trace_of_product};
@@ -276,8 +276,8 @@ impl Constitutive<4> for Stiffening {
     }
 }
 
-/// The tangent of the stiffening term in any direction of rank one is at most this times
-/// `h (tr Q I₁ + tr(Q cofᵀF cof F) |cof F|²/J²)`, found by sampling deformations.
+/// Largest tangent of the stiffening term in a direction of rank one, found by sampling. It is over
+/// `h (tr Q I₁ + tr(Q cofᵀF cof F) |cof F|²/J²)`.
 const STIFFENING: f32 = 5.5;
 
 /// One term of Ogden's law: s_i and its share of q_iso.

@@ -50,8 +50,8 @@ impl Relaxation {
         time_ms: [MS_PER_S * rows::SWINE_FAST_TIME.f32(), MS_PER_S * rows::SWINE_SLOW_TIME.f32(), 1.0],
     };
 
-    /// Brain at held strain over four minutes (Amedieu 2004): the solid's time from human cortex in
-    /// shear, then pore fluid in tens of seconds and minutes.
+    /// Brain at held strain over four minutes (Amedieu 2004). The solid's time is that of human
+    /// cortex, then come pore fluid in tens of seconds and minutes.
     pub const SOLID_AND_FLUID: Self = Self {
         share: [
             fits::RELAXATION_SOLID_SHARE.f32(),

@@ -31,8 +31,8 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     itself + stress.stiffening + volume * largest_eigenvalue(&d.c) + turning
 }
 
-/// The bound at rest times rest volume, from the multiple of the unit tensor that the isochoric
-/// stress is at rest, and the law's own stiffening there.
+/// The bound at rest times rest volume. `stress` is the multiple of the unit tensor that the
+/// isochoric stress is there.
 #[inline(always)]
 pub(crate) fn stiffness_at_rest<L: Lane>((stress, stiffening): (L, L), (mu, kappa): (L, L)) -> L {
     L::splat(3.0 + 3f32.sqrt()) * magnitude(stress) + stiffening + kappa + L::splat(5.0 / 3.0) * mu

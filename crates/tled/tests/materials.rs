@@ -123,3 +123,50 @@ fn the_plain_element_is_the_independent_codes_and_the_averaged_one_does_not_lock
     );
     assert!(plain_49 / 9.667 > 1.25, "the plain element must be seen to lock");
 }
+
+/// Faults and skipped time, ms, of a press of 8 mm into a block of 30 mm. Then how far the block is
+/// from rest 3 s after, mm, and 3 s after it was squashed to a share of its height.
+fn pressed_and_squashed(material: Material, height: f32) -> (u32, f32, [f32; 2]) {
+    let mesh = boxes::split_box([6; 3], Vec3::splat(30.0));
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
+    let body = Body::uniform(mesh, fixed, material);
+    let config = Config { averaged_pressure: true, dynamic_mass_scaling: 16.0, ..Config::default() };
+    let mut tled = Tled::new(&body, &config).expect("a sound body");
+    let mut contact = NodalContact::none();
+    let near = |p: Vec3| p.z > 29.0 && p.truncate().distance([15.0; 2].into()) < 6.0;
+    boxes::nodes_where(&body.mesh, near).iter().for_each(|&n| contact.add(n, 1.0));
+    contact.normalise();
+    (contact.normal, contact.stiffness, contact.damping) = (Vec3::Z, 0.3, 0.05);
+    let (mut loads, mut faults, mut skipped_ms) = (Loads { contacts: contact.into(), ..Loads::default() }, 0, 0.0);
+    let mut at_ms = 0.0f32;
+    while at_ms < 300.0 {
+        loads.contacts[0].offset_mm = (0.04 * at_ms).min(8.0) - 30.0;
+        let dt_ms = tled.next_dt_ms();
+        let report = tled.step(&loads, dt_ms);
+        faults += report.inverted + report.limited + report.non_finite;
+        skipped_ms += report.skipped_ms;
+        at_ms += dt_ms;
+    }
+    let mut rested = |squashed: bool| {
+        for (n, p) in body.mesh.positions.iter().enumerate().filter(|(_, p)| squashed && p.z > 1.0) {
+            tled.set_node(n as u32, Vec3::Z * ((height - 1.0) * p.z), Vec3::ZERO);
+        }
+        let mut at_ms = 0.0;
+        while at_ms < 3000.0 {
+            let dt_ms = tled.next_dt_ms();
+            tled.step(&Loads::default(), dt_ms);
+            at_ms += dt_ms;
+        }
+        distance(tled.positions(), &body.mesh.positions)
+    };
+    (faults, skipped_ms, [rested(false), rested(true)])
+}
+
+#[test]
+fn brain_as_fitted_bears_a_deep_press_and_comes_back_from_it_and_from_a_squash() {
+    for material in [Material::CORTEX, Material::CORONA_RADIATA, Material::CORPUS_CALLOSUM] {
+        let (faults, skipped_ms, left_mm) = pressed_and_squashed(material, 0.3);
+        println!("{faults} faults, {skipped_ms} ms skipped, {left_mm:?} mm left: {material:?}");
+        assert!(faults == 0 && skipped_ms == 0.0 && left_mm.iter().all(|mm| *mm < 0.05), "{material:?} {left_mm:?}");
+    }
+}

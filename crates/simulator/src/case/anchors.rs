@@ -1,4 +1,4 @@
-//! How the brain is held in its skull: by its stem, by arachnoid and fluid, falx and bridging veins.
+//! How the brain is held in its skull: by its stem, arachnoid and fluid, falx and bridging veins.
 //!
 //! # Theory
 //! The lowest end of the brain, at the foramen magnum, is fixed. Every border node within reach of
@@ -26,7 +26,7 @@ use crate::case::scene::{RestBrain, below};
 use crate::stages::skull_wall::SkullWall;
 use std::sync::Arc;
 use trepan_deformable::{BorderNode, ConfigError};
-use trepan_geometry::units::mpa_from_kpa;
+use trepan_geometry::{Vec3, units::mpa_from_kpa};
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::Anchor;
@@ -122,6 +122,6 @@ fn falx(mesh: &TetMesh, middle: f32, top: f32, fixed: &[u32]) -> Vec<Anchor> {
         is_inner[*node as usize] && (at.x - middle).abs() < 0.5 * spacing_mm && is_deep
     };
     let along = mpa_from_kpa(support::FALX_STIFFNESS.f32()) * spacing_mm * spacing_mm;
-    let anchor = |node| Anchor { node, normal: glam::Vec3::X, along, ..Anchor::default() };
+    let anchor = |node| Anchor { node, normal: Vec3::X, along, ..Anchor::default() };
     (0..mesh.positions.len() as u32).filter(in_falx).map(anchor).collect()
 }

@@ -89,8 +89,8 @@ impl Settling {
         Self { force: Force::Uniform { sinks: lost * weight * down, outward: weight * outward }, opened_ms: None }
     }
 
-    /// Makes the loads of a brain whose fluid drains from `up` on, a unit vector, until the share
-    /// `lost` of its buoyancy is gone; `speed_up` times as fast as in a patient.
+    /// Makes the loads of a brain whose fluid drains until the share `lost` of its buoyancy is gone.
+    /// `up`: unit vector against gravity. The fluid drains `speed_up` times as fast as in a patient.
     pub fn draining(brain: &TetMesh, up: Vec3, lost: f32, speed_up: f32) -> Self {
         let time_ms = support::DRAIN_TIME.value * 60e3 / f64::from(speed_up);
         let levels_mm = levels(brain, up, lost);

@@ -90,8 +90,8 @@ fn rows_of_relaxation() -> Vec<Row> {
     relaxation::NAMES.iter().enumerate().map(of).collect()
 }
 
-/// Moduli at hand speed over those of a slow test: the factor that, with relaxation, brings them
-/// nearest, in the mean of the logarithms, to what was measured fast, slow, and in life.
+/// Moduli at hand speed over those of a slow test. The factor brings them, with relaxation, nearest
+/// to what was measured fast, slow, and in life, in the mean of the logarithms.
 fn row_of_speed() -> Row {
     let [grey, white] =
         [Region::Cortex, Region::CoronaRadiata].map(|r| Fit::of(r, Form::Stiffening, PULLED).minimum.at[0]);

@@ -2,9 +2,9 @@
 //!
 //! # Theory
 //! Specimens are incompressible. Uniaxial nominal stress is `P₁ - P₃ λ₃/λ₁` at
-//! `F = diag(λ, λ^(-1/2), λ^(-1/2))`, which the pressure drops out of; simple shear stress is P₁₂ at
-//! `F = I + γ e₁ ⊗ e₂`. Every curve counts equally: a residual is divided by the largest stress of
-//! its curve and the root of its number of points. P is that of the solver's f64 laws.
+//! `F = diag(λ, λ^(-1/2), λ^(-1/2))`, which the pressure drops out of; simple shear stress is P₁₂
+//! at `F = I + γ e₁ ⊗ e₂`. Every curve counts equally: a residual is divided by the largest stress
+//! of its curve and the root of its number of points. P is that of the solver's f64 laws.
 //!
 //! # Practice
 //! A law is fitted to tension and compression, and its shear is a prediction; and to all three, to

@@ -113,8 +113,9 @@ fn chips(findings: &mut Findings) {
     findings.series.push(Series::over("Energy against chip", ["chip, um", "energy, J/mm3"], named));
 }
 
-/// Force of the law on a tooth at one speed over that at another, m/s, with the same chip: the
-/// spindle turns as fast as both need, and volume goes with the speed.
+/// Force of the law on a tooth at a fast speed over that at a slow one, m/s, with the same chip.
+///
+/// The spindle turns as fast as both need, and volume goes with the speed.
 fn speed_ratio(slow: f64, fast: f64) -> f64 {
     let radius_mm = 3.0;
     let force = |speed: f64| {
@@ -164,8 +165,9 @@ fn slab(thick_mm: f32, hu: impl Fn(f32) -> f32) -> BoneVolume {
     BoneVolume::new(&ct, isovalue as i16).expect("a slab has bone")
 }
 
-/// Time that a tool pressed by a force, N of the task, takes in its own bore through so much dense
-/// bone, s; NaN if it does not get through in a minute.
+/// Time that a tool pressed by a force, N of the task, takes through so much dense bone, s.
+///
+/// In its own bore; NaN if it does not get through in a minute.
 fn through_s(tool: &Tool, newtons: f64, thick_mm: f32) -> f64 {
     let bone = slab(thick_mm + tool.tip_radius_mm + 1.0, |_| skull::DENSITY_OF_REFERENCE.f32());
     let mut contact = Method::RECOMMENDED.build(tool);
@@ -187,21 +189,21 @@ fn through_s(tool: &Tool, newtons: f64, thick_mm: f32) -> f64 {
 fn pressing(findings: &mut Findings) {
     let thick_mm = skull::THICKNESS_PARIETAL.f32();
     let mean_n = hands::DRILLING_FORCE.value;
-    let speed = thick_mm / (1e3 * drilling::TIME_MANUAL.f32());
+    let speed = thick_mm / (1e3 * drilling::TIME_PERFORATOR.f32());
     let law = RemovalLaw::RATE;
     let fed =
         |radius_mm: f32, speed: f32| force_n(&law, radius_mm, std::f32::consts::PI * radius_mm * radius_mm * speed);
     let compared = [
-        Comparison::of(&drilling::TIME_MANUAL, How::Fitted, through_s(&Tool::burr(3.0), mean_n, thick_mm)),
+        Comparison::of(&drilling::TIME_PERFORATOR, How::Fitted, through_s(&Tool::burr(3.0), mean_n, thick_mm)),
         Comparison::of(&drilling::TIME_PERFORATOR, How::Fitted, through_s(&Tool::perforator(), mean_n, thick_mm)),
         Comparison::of(&hands::DRILLING_FORCE, How::Fitted, fed(3.0, speed)),
         Comparison::of(&hands::DRILLING_FORCE_LEAST, How::Fitted, f64::from(Cutter::BURR.rubbing_n(3.0))),
         Comparison::of(&hands::DRILLING_FORCE_MEAN, How::Predicted, fed(2.0, speed)),
     ];
     findings.rows.extend(compared.iter().map(Comparison::row));
-    let speeds = || (0..=30).map(|n| 0.04 * f64::from(n));
+    let speeds = || (0..=30).map(|n| 0.08 * f64::from(n));
     let line = |radius_mm: f32| speeds().map(|mm_s| (mm_s, fed(radius_mm, 1e-3 * mm_s as f32))).collect::<Vec<_>>();
-    let across = |row: &Row| vec![(0.0, row.value), (1.2, row.value)];
+    let across = |row: &Row| vec![(0.0, row.value), (2.4, row.value)];
     let lines = [
         ("6 mm burr", line(3.0)),
         ("4 mm burr", line(2.0)),
@@ -244,8 +246,9 @@ fn layers(findings: &mut Findings) {
     findings.series.push(Series::over(title, axes, named));
 }
 
-/// How far past the far side a drill goes that is let go a reaction time after a hand notices that
-/// the bone's force falls, mm.
+/// How far past the far side a drill goes that is let go after a reaction time, mm.
+///
+/// The time begins where a hand notices that the bone's force falls.
 fn plunge_mm(reaction_ms: f64) -> f64 {
     let (thick_mm, radius_mm) = (2.0f32, 1.5f32);
     let bone = slab(thick_mm, |_| skull::DENSITY_OF_REFERENCE.f32());
@@ -313,9 +316,10 @@ struct Chord {
     greatest_hu: f64,
 }
 
-/// Sites by their direction from the middle of the head, right, anterior and superior: midway from
-/// nasion to coronal suture, parietal eminence, anterior temporal bone, midway from mastoid to
-/// occipital protuberance, temporal squama.
+/// Sites by their direction from the middle of the head, right, anterior and superior.
+///
+/// Midway from nasion to coronal suture, parietal eminence, anterior temporal bone, midway from
+/// mastoid to occipital protuberance, temporal squama.
 const SITES: [[f64; 3]; 5] =
     [[0.0, 1.0, 0.5], [0.8, -0.35, 0.6], [1.0, 0.35, -0.2], [0.5, -1.0, -0.4], [1.0, 0.1, -0.2]];
 /// How far the middle of the head lies under its top, mm.

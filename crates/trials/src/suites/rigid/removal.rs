@@ -14,6 +14,7 @@
 //! The swept volume is counted twice: as the method says, and in the bone that is left, at 64 or
 //! 512 points a voxel where the density, trilinear between voxels, and the cut, a spline between
 //! its nodes, both say so. No front is asked for: the law of removal is the same for all.
+//! Burrs cut by the law without edges: edges that rub leave what a hand does not press enough for.
 
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
@@ -24,6 +25,7 @@ use glam::{DVec3, IVec3};
 use std::f64::consts::PI;
 use std::time::Instant;
 use trepan_geometry::{Tool, Vec3};
+use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{BoneVolume, cut_depth};
 
@@ -103,7 +105,7 @@ fn stroke(method: &Method, normal: Vec3, points: i32, times: &mut Vec<f64>) -> (
     const REST: usize = 500;
     let bone = voxels(EDGE, VOXEL_MM, |p| p.dot(normal.as_dvec3()));
     let before = volume_mm3(&bone, points);
-    let mut contact = method.build(&Tool::burr(R as f32));
+    let mut contact = method.with_removal(RemovalLaw::CONSTANT_ENERGY).build(&Tool::burr(R as f32));
     let (across, mut out, mut said) = (normal.any_orthonormal_vector(), RigidStep::default(), 0.0);
     contact.reset(held(normal * R as f32, normal).world_from_tool);
     let way = (0..TICKS).flat_map(|tick| {
@@ -195,7 +197,7 @@ fn rates(method: &Method, scope: Scope) -> Row {
 /// load lets it fall into the bone.
 fn pressed(method: &Method, dt_ms: f64, total_ms: f64) -> (f64, f64) {
     let bone = voxels(EDGE, VOXEL_MM, |p| p.z);
-    let mut contact = method.build(&Tool::burr(R as f32));
+    let mut contact = method.with_removal(RemovalLaw::CONSTANT_ENERGY).build(&Tool::burr(R as f32));
     contact.reset(held(Vec3::Z * R as f32, Vec3::Z).world_from_tool);
     let (mut out, mut removed) = (RigidStep::default(), 0.0);
     // The hand sinks as its load outweighs what it feels at 2 N/mm, and rises where it feels more.

@@ -3,9 +3,9 @@
 //!
 //! # Theory
 //! Outputs: the time until it comes through under the load, at most a minute, and the mean force at
-//! the feed once the ball is in the bone, to a millimetre before the far side; a hand that would need
-//! more than people give counts as giving that. Newtons are those of the task; contact and removal
-//! are those of the default method.
+//! the feed once the ball is in the bone, to a millimetre before the far side. A hand that would
+//! need more than people give counts as giving that. Newtons are those of the task; contact and
+//! removal are those of the default method.
 
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -29,7 +29,7 @@ const TABLE: f32 = 0.25;
 /// Bone begins here, HU.
 const ISOVALUE: i16 = 400;
 /// A tick, ms: the law of removal does not depend on it.
-const TICK_MS: f32 = 8.0;
+const TICK_MS: f32 = 16.0;
 /// Time after which a burr counts as not coming through, ms.
 const LONGEST_MS: f32 = 60_000.0;
 /// The steady feed, mm/ms.

@@ -43,7 +43,10 @@ fn number(row: &Row, metric: &str) -> f64 {
 fn conclusion(output: &str, rows: &[&Row]) -> String {
     let mut by_share: Vec<&&Row> = rows.iter().filter(|row| number(row, "total_percent") >= 5.0).collect();
     by_share.sort_by(|a, b| number(b, "total_percent").total_cmp(&number(a, "total_percent")));
-    let part = |row: &&&Row| format!("{:.0} % from the {}", number(row, "total_percent"), row.method);
+    let part = |row: &&&Row| {
+        let [share, error] = ["total_percent", "total_error_percent"].map(|metric| number(row, metric));
+        format!("{share:.0} ± {error:.0} % from the {}", row.method)
+    };
     let parts: Vec<String> = by_share.iter().map(part).collect();
     let [now, low, high] = ["output", "output_p16", "output_p84"].map(|metric| number(rows[0], metric));
     format!("{output}: {now:.3} ({low:.3} to {high:.3} for two thirds of the ranges): {}.", parts.join(", "))
@@ -95,7 +98,7 @@ mod tests {
 
     fn row(name: &str, effect: f64, total: f64) -> Row {
         let row = Row::new("press: force, N", name).with("row", "brain/x").metric("effect_percent", effect);
-        row.metric("total_percent", total).metric("output", 0.2)
+        row.metric("total_percent", total).metric("total_error_percent", 5.0).metric("output", 0.2)
     }
 
     #[test]
@@ -105,7 +108,7 @@ mod tests {
         findings.rows.push(Row::new("closed forms", "sobol").metric("index_error", 0.01));
         judge(Scope { quick: true, seed: 1 }, &mut findings);
         assert_eq!(findings.tables[0].rows[0][0], "strong");
-        assert!(findings.conclusions[0].contains("71 % from the strong"), "{:?}", findings.conclusions);
+        assert!(findings.conclusions[0].contains("71 ± 5 % from the strong"), "{:?}", findings.conclusions);
         assert!(findings.gates.iter().all(|gate| gate.pass));
         findings.rows = vec![row("none", 0.0, f64::NAN)];
         findings.gates.clear();

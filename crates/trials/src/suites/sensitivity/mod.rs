@@ -42,7 +42,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
 /// Screens a scene's constants, shares out the variance among the first, and adds a row for each
 /// constant and output.
 fn rank(scene: &Scene, scope: Scope, findings: &mut Findings) {
-    let (trajectories, rows) = scope.pick((4, 16), (16, 256));
+    let (trajectories, rows) = scope.pick((3, 8), (16, 256));
     let logarithm = |outputs: [f64; OUTPUTS]| outputs.map(|output| output.max(f64::MIN_POSITIVE).ln());
     let all = scene.inputs.len();
     let effects = morris::effects(all, trajectories, &mut scope.random(1), |places| logarithm(scene.at(places)));

@@ -8,7 +8,7 @@
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
-use trepan_measurements::{brain, brain_living, fits, hands, sensitivity};
+use trepan_measurements::{brain_living, fits, hands, sensitivity};
 use trepan_simulator::{HapticConfig, Program, TissueClass};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
@@ -46,7 +46,7 @@ pub fn of_brain() -> Vec<Input> {
     vec![
         Input { value: usual.shear_mpa(), ..Input::of("shear modulus", sensitivity::SHEAR_MODULUS) },
         Input { value: 0.5 - f64::from(usual.poisson()), ..Input::of("compressibility", sensitivity::COMPRESSIBILITY) },
-        Input { value: usual.density_g_mm3().into(), ..Input::of("density", brain::DENSITY) },
+        Input { value: usual.density_g_mm3().into(), ..Input::of("density", sensitivity::DENSITY) },
         Input::of("share that does not stiffen", fits::BRAIN_SHARE),
         Input::of("strain of stiffening", fits::BRAIN_BOUND),
     ]

@@ -67,8 +67,7 @@ fn run(values: &[f64]) -> [f64; OUTPUTS] {
     [sunk(0, top), sunk(1, centre)]
 }
 
-/// Springs of the surface: the layer's modulus, kPa, and shear over it, and that of veins beside the
-/// midline, kPa/mm.
+/// Springs of the surface from the layer's modulus, kPa, shear over it, and that of veins, kPa/mm.
 fn anchors(mesh: &TetMesh, [layer, layer_shear, veins]: [f64; 3]) -> Vec<Anchor> {
     let mut areas = vec![Vec3::ZERO; mesh.positions.len()];
     for triangle in Surface::of(mesh).triangles {

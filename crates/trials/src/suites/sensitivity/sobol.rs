@@ -122,8 +122,8 @@ fn estimate(sampled: &[&Sampled], inputs: usize) -> Vec<Indices> {
 /// Largest error of an index on two functions whose indices are known in closed form, with so many
 /// rows.
 ///
-/// Ishigami: `sin x₁ + 7 sin² x₂ + 0.1 x₃⁴ sin x₁`, x in -π..π. g: `Π (|4 x_i - 2| + a_i)/(1 + a_i)`
-/// with a of 0, 1, 4.5, 9.
+/// Ishigami: `sin x₁ + 7 sin² x₂ + 0.1 x₃⁴ sin x₁`, x in -π..π. g: `Π (|4 x_i - 2| + a_i)/(1 +
+/// a_i)` with a of 0, 1, 4.5, 9.
 pub fn error_on_closed_forms(rows: usize, seed: u64) -> f64 {
     let worst = |found: &Shares, truth: &[[f64; 2]]| {
         let off =
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn published_indices_of_ishigami_are_those_of_the_closed_form() {
-        // Saltelli et al., Global Sensitivity Analysis, 2008: 0.314, 0.442, 0; total 0.558, 0.442, 0.244.
+        // Saltelli et al., Global Sensitivity Analysis, 2008: first, then total, by input.
         let truth = ishigami_truth().concat();
         for (is, published) in truth.iter().zip([0.314, 0.558, 0.442, 0.442, 0.0, 0.244]) {
             assert!((is - published).abs() < 1e-3, "{is} {published}");

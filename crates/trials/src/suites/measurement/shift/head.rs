@@ -3,18 +3,20 @@
 //! # Theory
 //! Over minutes tissue is at rest under its loads at every moment, with the stress that relaxation
 //! has left by then. After a time t the share `Σ g_i (1 - e^(-t/τ_i))` of the stress has relaxed; a
-//! solver whose whole relaxation is that share, and quick, comes to rest under the same moduli
-//! whatever the law. What a load of changing size does before t counts as if it had acted for t.
+//! solver whose whole relaxation is that share comes to rest under the same moduli whatever the
+//! law. What a load of changing size does before t counts as if it had acted for t.
 //!
 //! # Practice
-//! Contact with the skull is found anew in each round; a state takes some hundred steps.
+//! Contact with the skull is found anew in each round; a state takes some
+//! ten evaluations of the forces.
 
 use crate::suites::simulators::case;
 use anyhow::{Context, Result};
 use glam::Vec3;
 use std::sync::Arc;
+use trepan_budget::Quality;
 use trepan_contact::NodalContacts;
-use trepan_simulator::{Cache, Held, Plan, Program, RestBrain, Scene, SkullWall, TissueClass, open_case};
+use trepan_simulator::{Cache, Held, Ingredients, Plan, Program, RestBrain, Scene, SkullWall, TissueClass, open_case};
 use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
 use trepan_volume::BoneVolume;
@@ -24,9 +26,9 @@ const OPENING_MM: f32 = 12.0;
 /// Young's modulus of the brain, MPa: the programs' default.
 const BRAIN_MPA: f32 = 0.003;
 /// Rounds of finding the skull anew, and the end of each.
-const ROUNDS: usize = 4;
-const REST: Settling = Settling { tolerance_mm: 0.02, steps: 1500 };
-/// Time constant of a relaxation that is over before a body has come to rest, ms.
+const ROUNDS: usize = 2;
+const REST: Settling = Settling { tolerance_mm: 0.02, steps: 300 };
+/// Time constant of the terms, ms: at rest they are over.
 const QUICK_MS: f32 = 1.0;
 
 /// Brain, skull and opening of the built-in case.
@@ -63,15 +65,22 @@ impl Head {
 
     /// The brain at rest as the programs hold it, after a time of relaxation, minutes.
     pub fn at_rest(&self) -> Result<Still> {
+        let with = Ingredients::of(Quality::Auto);
         let Held { fixed, anchors, wall } = self.brain.held_in_skull(Arc::clone(&self.bone), &self.plan)?;
         let body = Body {
             mesh: self.brain.mesh.clone(),
             fixed,
             anchors,
-            materials: TissueClass::ALL.map(|class| class.material(BRAIN_MPA)).to_vec(),
+            materials: with.materials(BRAIN_MPA),
             material_of_tet: self.brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
-        Ok(Still { wall, solver: solver(&body, 0.0)?, body, loads: Loads::default() })
+        Ok(Still {
+            wall,
+            solver: solver(&body, with.relaxation(), 0.0)?,
+            relaxation: with.relaxation(),
+            body,
+            loads: Loads::default(),
+        })
     }
 }
 
@@ -82,6 +91,7 @@ pub struct Still {
     /// What is simulated.
     pub body: Body,
     solver: Tled,
+    relaxation: Relaxation,
     wall: Option<SkullWall>,
 }
 
@@ -89,7 +99,7 @@ impl Still {
     /// Brings the brain to rest under its loads, with what relaxes in some minutes gone.
     pub fn rest(&mut self, minutes: f64) -> Result<()> {
         let before = self.solver.positions().to_vec();
-        self.solver = solver(&self.body, minutes)?;
+        self.solver = solver(&self.body, self.relaxation, minutes)?;
         for (node, at) in (0u32..).zip(&before) {
             self.solver.set_node(node, *at - self.body.mesh.positions[node as usize], Vec3::ZERO);
         }
@@ -143,6 +153,13 @@ impl Still {
         if near.is_empty() { (0..positions.len()).min_by(nearest).into_iter().collect() } else { near }
     }
 
+    /// Whether a node lies in tissue alone, not at the fluid of a ventricle.
+    pub fn is_tissue(&self, node: usize) -> bool {
+        let is_fluid = |material: &u8| *material == TissueClass::Ventricle as u8;
+        let pairs = self.body.mesh.tets.iter().zip(&self.body.material_of_tet);
+        !pairs.filter(|(_, material)| is_fluid(material)).any(|(tet, _)| tet.contains(&(node as u32)))
+    }
+
     /// Mean displacement of the nodes around a place at rest, mm.
     pub fn moved_around(&self, place: Vec3, radius_mm: f32) -> Vec3 {
         let near = self.around(place, radius_mm);
@@ -150,8 +167,8 @@ impl Still {
     }
 }
 
-fn solver(body: &Body, minutes: f64) -> Result<Tled> {
-    let Relaxation { share, time_ms } = Relaxation::BRAIN;
+fn solver(body: &Body, relaxation: Relaxation, minutes: f64) -> Result<Tled> {
+    let Relaxation { share, time_ms } = relaxation;
     let relaxed = |(share, time_ms): (&f32, &f32)| share * (1.0 - (-60e3 * minutes / f64::from(*time_ms)).exp()) as f32;
     let relaxed: f32 = share.iter().zip(&time_ms).map(relaxed).sum();
     let relaxation = Relaxation {

@@ -50,7 +50,10 @@ pub fn findings(findings: &mut Findings) -> Result<()> {
                  falls in a blade that is set once",
             ),
             predicted(&retraction::HALF_TIME, half).why(quick),
-            predicted(&retraction::RECORDED_MOST, first),
+            predicted(&retraction::RECORDED_MOST, first).why(
+                "that is the largest of 120 blades, at depths that were not published; here is one blade, a centimetre \
+                 deep",
+            ),
         ]
         .map(|comparison| comparison.row()),
     );

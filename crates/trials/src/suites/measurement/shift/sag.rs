@@ -15,6 +15,10 @@ const MINUTES: f64 = sag::SETTLED.value;
 /// Targets of stereotactic surgery lie within this distance of the brain's centre, mm.
 const DEEP_MM: f32 = 25.0;
 
+/// Why the brain moves less from lying to sitting.
+const SITTING: &str = "in a person who sits up fluid leaves the skull for the spine and the ventricles shrink, which \
+                       moves the brain further; here its weight in fluid turns and nothing else changes";
+
 /// Rows of the turned head.
 pub fn findings(findings: &mut Findings) -> Result<()> {
     let head = Head::new()?;
@@ -36,8 +40,8 @@ pub fn findings(findings: &mut Findings) -> Result<()> {
                 "the falx and the layer of arachnoid hold the brain as firmly to the side as to front and back here; \
                  in people it deforms more to the side",
             ),
-            predicted(&sag::PINEAL_DOWN, -pineal.z),
-            predicted(&sag::PINEAL_FORWARD, pineal.y),
+            predicted(&sag::PINEAL_DOWN, -pineal.z).why(SITTING),
+            predicted(&sag::PINEAL_FORWARD, pineal.y).why(SITTING),
             predicted(&sag::TONSIL_DOWN, -tonsil.z).why(
                 "the stem is fixed at the foramen magnum here; in people it moves with the spinal cord, and the \
                  tonsils with it",
@@ -65,7 +69,8 @@ fn turned(head: &Head, from: Vec3, to: Vec3) -> Result<Still> {
 }
 
 fn deep_nodes(still: &Still) -> Vec<usize> {
-    still.around(still.body.mesh.bounds().centre(), DEEP_MM)
+    let near = still.around(still.body.mesh.bounds().centre(), DEEP_MM);
+    near.into_iter().filter(|node| still.is_tissue(*node)).collect()
 }
 
 /// Displacement of the pineal body, which lies behind the centre of the brain on the midline.
