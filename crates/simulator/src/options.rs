@@ -110,7 +110,7 @@ pub struct Options {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1. The brain sinks
-    /// [default: 0.4, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
+    /// [default: 0.3, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
     #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,
     /// How much faster than in a patient the fluid drains, 1 to 1000 [default: 60, a minute for an
