@@ -389,7 +389,7 @@ impl Options {
         within("young-modulus-kpa", self.young_modulus_kpa.map_or(softest, f64::from), softest, stiffest)?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
         let [least, most] = ForceScale::RANGE;
-        within("force-scale", self.force_scale.map_or(most, |scale| f64::from(scale)), least, most)?;
+        within("force-scale", self.force_scale.map_or(most, f64::from), least, most)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
         within("csf-speed-up", self.csf_speed_up.unwrap_or(1.0).into(), CSF_SPEED_UPS[0], CSF_SPEED_UPS[1])?;
         within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;

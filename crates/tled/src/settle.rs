@@ -14,8 +14,8 @@
 //!
 //! # Practice
 //! About 10 to 40 evaluations of the forces, each at the cost of a step of motion, and about as
-//! many solutions of the factored tangent. A slender body takes a thousandth of the steps that motion
-//! damped to rest takes. Tissue that relaxes ends fully relaxed.
+//! many solutions of the factored tangent. A slender body takes a thousandth of the steps that
+//! motion damped to rest takes. Tissue that relaxes ends fully relaxed.
 
 use crate::tled::Tled;
 use glam::DVec3;

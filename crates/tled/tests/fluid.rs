@@ -15,7 +15,7 @@ fn block() -> Body {
 }
 
 fn settled(body: &Body, loads: &Loads) -> Vec<Vec3> {
-    let mut tled = Tled::new(body, &Config::default()).unwrap();
+    let mut tled = Tled::new(body, &Config::default()).expect("the body is sound");
     assert!(tled.settle(loads, &Settling { tolerance_mm: 1e-3, steps: 50_000 }).converged);
     tled.positions().to_vec()
 }

@@ -58,6 +58,7 @@ pub struct Settling {
 
 /// What acts.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a session has one, and a step does not move it")]
 enum Force {
     /// A body force on the whole brain.
     Uniform { sinks: Vec3, outward: Vec3 },

@@ -94,7 +94,7 @@ mod tests {
     #[test]
     fn a_decay_is_found_and_its_errors_are_those_of_linear_theory() {
         let data: Vec<[f64; 2]> = (0..20).map(|i| f64::from(i) * 0.2).map(|t| [t, 3.0 * (-0.7 * t).exp()]).collect();
-        let noise = |i: usize| if i % 2 == 0 { 1e-3 } else { -1e-3 };
+        let noise = |i: usize| if i.is_multiple_of(2) { 1e-3 } else { -1e-3 };
         let left = |p: &[f64]| {
             let of = |(i, [t, y]): (usize, &[f64; 2])| p[0] * (-p[1] * t).exp() - y - noise(i);
             data.iter().enumerate().map(of).collect()

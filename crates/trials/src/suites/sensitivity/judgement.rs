@@ -22,7 +22,7 @@ pub fn judge(_: Scope, findings: &mut Findings) {
         conclusions.push(conclusion(output, &rows));
         tables.push(table(output, &rows));
         series.push(chart(output, &rows));
-        unranked += usize::from(rows.iter().all(|row| !(number(row, "effect_percent") > 0.0)));
+        unranked += usize::from(!rows.iter().any(|row| number(row, "effect_percent") > 0.0));
     }
     let error = findings.rows.iter().find_map(|row| row.metrics.get("index_error")).copied().unwrap_or(f64::NAN);
     let name = "variance shares of Ishigami's function and the g-function: largest error of a share";

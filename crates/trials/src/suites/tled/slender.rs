@@ -108,8 +108,8 @@ fn cylinder(across: usize, count: usize) -> (Body, usize) {
 }
 
 impl Rod {
-    /// The rod, held at x = 0, and the node in the middle of its free end. Cells lie along and across
-    /// it; squares of the section become rings.
+    /// The rod, held at x = 0, and the node in the middle of its free end. Cells lie along and
+    /// across it; squares of the section become rings.
     pub fn body(self, [count, across]: [usize; 2], material: Material) -> (Body, usize) {
         let mut mesh = boxes::split_box([count, across, across], Vec3::new(self.length_mm, 2.0, 2.0));
         for p in &mut mesh.positions {
