@@ -196,7 +196,7 @@ impl RemovalLaw {
         perforator: Cutter::PERFORATOR,
         cancellous_share: skull::CUTTING_SHARE_OF_CANCELLOUS.f32(),
         stiffness: drilling::CONTACT_STIFFNESS.f32() / FORCE_SCALE,
-        max_load_n: hands::DRILLING_PEAK_GREATEST.f32(),
+        max_load_n: drilling::BURR_GREATEST_LOAD.f32(),
     };
 
     /// The law of versions before 0.3, which recordings of them ran with.

@@ -84,7 +84,7 @@ mod tests {
         let spindle = Spindle { stall_rpm: 0.0, ..Spindle::DRILL };
         let power = |torque: f32| torque * per_ms(spindle.rpm(torque));
         let half = 0.5 * spindle.stopping_nmm();
-        assert!((power(half) - 60.0).abs() < 1e-3 && power(0.9 * half) < 60.0 && power(1.1 * half) < 60.0);
+        assert!((power(half) - 120.0).abs() < 1e-3 && power(0.9 * half) < 120.0 && power(1.1 * half) < 120.0);
         assert_eq!((spindle.rpm(0.0), Spindle::DRILL.rpm(1.01 * Spindle::DRILL.stall_nmm())), (60_000.0, 0.0));
         assert!((Spindle::DRILL.rpm(0.999 * Spindle::DRILL.stall_nmm()) - 20_000.0).abs() < 100.0);
     }
