@@ -38,6 +38,7 @@ const USED: &[&str] = &[
     "drilling/burr-edge",
     "drilling/burr-edges",
     "drilling/burr-energy",
+    "drilling/burr-greatest-load",
     "drilling/burr-pole-share",
     "drilling/burr-power",
     "drilling/burr-speed",
