@@ -72,6 +72,9 @@ pub struct Plan {
     pub away_mm: f32,
     /// How far past the inner side of the bone the burr's centre goes if there is room, mm.
     pub breakthrough_mm: f32,
+    /// How far behind the hand a burr stays that has cut its way, mm: it only rubs under a least
+    /// force.
+    pub burr_lag_mm: f32,
     /// Distance of the burr's foremost point from the brain if there is room, mm.
     pub burr_clearance_mm: f32,
     /// Largest depth of the burr's foremost point in the brain, mm, to make a hole wide enough for
@@ -96,6 +99,7 @@ impl Default for Plan {
             start_mm: 35.0,
             away_mm: 40.0,
             breakthrough_mm: 0.75,
+            burr_lag_mm: 0.5,
             burr_clearance_mm: 0.3,
             burr_overlap_mm: 0.8,
             aspirator_radius_mm: 1.5,
@@ -107,9 +111,9 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// Final depth of the burr's centre below the entry, mm.
+    /// Final depth of the hand that holds the burr below the entry, mm.
     ///
-    /// It goes `breakthrough_mm` past the bone. If the brain is nearer, it stops before the brain.
+    /// The burr's centre lags behind the hand. It goes `breakthrough_mm` past the bone. If the brain is nearer, it stops before the brain.
     /// If the hole at the bone's inner side would then be too narrow for the probe, it continues
     /// into the brain, at most by the overlap.
     pub fn burr_depth_mm(&self, site: &Site) -> f32 {
@@ -119,7 +123,7 @@ impl Plan {
         let (burr, hole) = (self.burr_radius_mm, self.probe_radius_mm + ROOM_MM);
         let wide_enough = site.bone_mm - (burr * burr - hole * hole).max(0.0).sqrt();
         let deepest = site.brain_mm + self.burr_overlap_mm - self.burr_radius_mm;
-        wanted.min(clear_of_brain.max(wide_enough)).min(deepest)
+        wanted.min(clear_of_brain.max(wide_enough)).min(deepest) + self.burr_lag_mm
     }
 }
 

@@ -93,7 +93,9 @@ mod tests {
     #[test]
     fn a_softer_brain_with_softer_supports_sinks_in_proportion() {
         let scene = scene();
-        let values: Vec<f64> = scene.inputs.iter().map(|input| input.value).collect();
+        let mut values: Vec<f64> = scene.inputs.iter().map(|input| input.value).collect();
+        // A small loss: what sinks far stiffens and leaves the fluid.
+        values[5] = 0.1;
         let mut softer = values.clone();
         [0, 7, 9].into_iter().for_each(|stiffness| softer[stiffness] *= 0.8);
         let (one, two) = ((scene.run)(&values), (scene.run)(&softer));

@@ -19,6 +19,10 @@ const DEEP_MM: f32 = 25.0;
 const SITTING: &str = "in a person who sits up fluid leaves the skull for the spine and the ventricles shrink, which \
                        moves the brain further; here its weight in fluid turns and nothing else changes";
 
+/// Why a value that the layer was fitted to may lie outside.
+const FITTED_BY_HAND: &str = "the layer between brain and skull was fitted by hand, and the laws of brain changed \
+                              after that";
+
 /// Rows of the turned head.
 pub fn findings(findings: &mut Findings) -> Result<()> {
     let head = Head::new()?;
@@ -34,8 +38,8 @@ pub fn findings(findings: &mut Findings) -> Result<()> {
     let predicted = |row, ours: f32| Comparison::of(row, How::Predicted, ours.into());
     findings.rows.extend(
         [
-            fitted(&sag::PRONE_TO_SUPINE_LEAST, least),
-            fitted(&sag::PRONE_TO_SUPINE_MOST, most),
+            fitted(&sag::PRONE_TO_SUPINE_LEAST, least).why(FITTED_BY_HAND),
+            fitted(&sag::PRONE_TO_SUPINE_MOST, most).why(FITTED_BY_HAND),
             predicted(&sag::SIDE_TO_SIDE_MOST, aside).why(
                 "the falx and the layer of arachnoid hold the brain as firmly to the side as to front and back here; \
                  in people it deforms more to the side",
