@@ -113,9 +113,9 @@ impl Default for Plan {
 impl Plan {
     /// Final depth of the hand that holds the burr below the entry, mm.
     ///
-    /// The burr's centre lags behind the hand. It goes `breakthrough_mm` past the bone. If the brain is nearer, it stops before the brain.
-    /// If the hole at the bone's inner side would then be too narrow for the probe, it continues
-    /// into the brain, at most by the overlap.
+    /// The burr's centre lags behind the hand. It goes `breakthrough_mm` past the bone. If the
+    /// brain is nearer, it stops before the brain. If the hole at the bone's inner side would then
+    /// be too narrow for the probe, it continues into the brain, at most by the overlap.
     pub fn burr_depth_mm(&self, site: &Site) -> f32 {
         const ROOM_MM: f32 = 0.5;
         let wanted = site.bone_mm + self.breakthrough_mm;

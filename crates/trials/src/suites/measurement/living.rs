@@ -11,14 +11,18 @@ use crate::engine::suite::Findings;
 use crate::suites::tled::outside::{Pressed, Shape, Size};
 use crate::suites::{Part, Scope};
 use anyhow::Result;
+use trepan_budget::Quality;
 use trepan_contact::NodalContacts;
 use trepan_measurements::living;
 use trepan_simulator::measure::tissue::{MASS_ADDED, PressedBall};
+use trepan_simulator::{Ingredients, TissueClass};
 use trepan_soft::{Loads, SoftSolver};
-use trepan_tled::{Config, Relaxation, Tled};
+use trepan_tled::{Config, Tled};
 
 /// Time between updates of the ball, ms.
 const TURN_MS: f32 = 8.0;
+/// Young's modulus of the brain, MPa: the programs' default.
+const YOUNG_MPA: f32 = 0.003;
 /// Mesh of the preset `usual`.
 const USUAL: Size = Size { count: 8_000, halvings: 4, of_truth: false };
 
@@ -28,8 +32,10 @@ pub fn parts(_: Scope) -> Vec<Part> {
 }
 
 fn palpation(findings: &mut Findings) -> Result<()> {
-    let pressed = Shape::block()?.pressed(USUAL, false)?;
-    let curve = press(&pressed)?;
+    let mut pressed = Shape::block()?.pressed(USUAL, false)?;
+    let with = Ingredients::of(Quality::Auto);
+    pressed.body.materials = vec![with.materials(YOUNG_MPA)[TissueClass::Brain as usize]];
+    let curve = press(&pressed, &with)?;
     let (depth_mm, force_n) = curve[curve.len() - 1];
     let ours_kpa = hertz_kpa(depth_mm, force_n);
     let why = "the ball presses bare brain here, through scalp and scar there";
@@ -64,11 +70,11 @@ fn hertz_kpa(depth_mm: f64, force_n: f64) -> f64 {
 }
 
 /// Depth, mm, and force, N, as the ball goes in.
-fn press(pressed: &Pressed) -> Result<Vec<(f64, f64)>> {
+fn press(pressed: &Pressed, with: &Ingredients) -> Result<Vec<(f64, f64)>> {
     let config = Config {
         mass_scaling: MASS_ADDED,
         averaged_pressure: true,
-        relaxation: Relaxation::BRAIN,
+        relaxation: with.relaxation(),
         ..Config::default()
     };
     let mut solver = Tled::new(&pressed.body, &config)?;
