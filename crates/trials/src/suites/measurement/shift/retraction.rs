@@ -38,8 +38,8 @@ pub fn findings(findings: &mut Findings) -> Result<()> {
     let early: f64 = (1..=500).map(|n| at(APPROACH_MIN * f64::from(n) / 500.0)).sum::<f64>() / 500.0;
     let half = line.iter().find(|(_, torr)| *torr <= 0.5 * first).map_or(f64::INFINITY, |(minutes, _)| *minutes);
     let predicted = |row, ours| Comparison::of(row, How::Predicted, ours);
-    let quick = "the pressure falls within seconds here, as the relaxation measured in the dish does; in life it \
-                 falls over minutes, and the surgeon sets the blade again";
+    let quick = "relaxation was measured in the dish, and to 250 s only; in life pressure falls on for longer, and the \
+                 surgeon sets the blade again";
     findings.rows.extend(
         [
             predicted(&retraction::TUMOUR_APPROACH, early).why(quick),
