@@ -275,7 +275,8 @@ mod tests {
                                                                   burr_radius_mm in 2.5f32..4.0) {
             let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm, brain_mm: bone_mm + gap_mm };
             let plan = Plan { burr_radius_mm, probe_radius_mm: 0.6 * burr_radius_mm, ..Plan::default() };
-            let depth_mm = plan.burr_depth_mm(&site);
+            // Of the burr's centre, which stays behind the hand.
+            let depth_mm = plan.burr_depth_mm(&site) - plan.burr_lag_mm;
             let into_brain_mm = depth_mm + burr_radius_mm - site.brain_mm;
             prop_assert!(into_brain_mm <= plan.burr_overlap_mm + 1e-5);
             prop_assert!(depth_mm <= bone_mm + plan.breakthrough_mm + 1e-5);
