@@ -101,7 +101,8 @@ mod tests {
         let (one, two) = ((scene.run)(&values), (scene.run)(&softer));
         assert!(one[0] > one[1] && one[1] > 0.01, "{one:?}");
         for (a, b) in one.iter().zip(two) {
-            assert!((0.8 * b / a - 1.0).abs() < 0.03, "{one:?} {two:?}");
+            // Less than in proportion, by what the law stiffens as it sinks further.
+            assert!((0.9..1.01).contains(&(0.8 * b / a)), "{one:?} {two:?}");
         }
     }
 }
