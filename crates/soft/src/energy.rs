@@ -9,7 +9,7 @@
 //! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly
 //! below `J₀ = 0.3` it stays once differentiable, and its force always pushes J back towards 1: an
 //! inverted element heals by itself. That line has no wall at J = 0, which the law itself has, so
-//! `w² (1 + b w²)` stands in for it ([`VolumeWall`]): with `J₁ = J₀` and b = 4 a pressure up to 5 κ,
+//! `w² (1 + b w²)` stands in ([`VolumeWall`]): with `J₁ = J₀` and b = 4 a pressure up to 5 κ,
 //! from J₀ down to 0 and constant beyond. With `w²` alone single elements under a probe 8 mm deep
 //! still inverted. It acts along C alone. A steeper g would pull an inverted element towards F = 0,
 //! and a body turned inside out would not come back.

@@ -122,12 +122,19 @@ fn incompressible(findings: &mut Findings) {
     }
 }
 
+const KIRCHHOFF: &str = "St. Venant-Kirchhoff";
+
+/// Laws whose maps over deformation are drawn side by side.
+fn laws() -> [(&'static str, Material); 3] {
+    let kirchhoff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
+    [("neo-Hookean", Material::BRAIN), (KIRCHHOFF, kirchhoff), ("stiffening, of cortex", Material::CORTEX)]
+}
+
 /// Squeezes or draws a block to a multiple of its height, then lets it go. It must be back at rest
 /// after a second, or be reported as turned over or limited on the way.
 fn stretched(findings: &mut Findings) {
     for stretch in [0.05f32, 0.1, 0.5, 2.0, 5.0] {
-        let kirchhoff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
-        for (method, material) in [("neo-Hookean", Material::BRAIN), ("St. Venant-Kirchhoff", kirchhoff)] {
+        for (method, material) in laws() {
             let body = cube(4, material);
             let mut solver = solver(&body, Config { max_displacement: 10.0, ..Config::default() });
             for (n, p) in body.mesh.positions.iter().enumerate() {
@@ -142,7 +149,7 @@ fn stretched(findings: &mut Findings) {
             if wanted {
                 let name = format!("{scene}, {method}: comes back or reports");
                 findings.gates.push(Gate::at_least(name, f64::from(held || reported > 0), 1.0));
-            } else if stretch < 0.2 {
+            } else if stretch < 0.2 && method == KIRCHHOFF {
                 let name = format!("{scene}, {method}: fails (the border is where it is)");
                 findings.gates.push(Gate::at_most(name, f64::from(held), 0.0));
             }
@@ -163,9 +170,8 @@ fn released(solver: &mut Tled, body: &Body) -> (f64, u32) {
 
 /// Elements turned inside out, some or all; an energy without a wall at J = 0 leaves them so.
 fn inverted(findings: &mut Findings) {
-    let kirchhoff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
     for percent in [1usize, 10, 100] {
-        for (method, material) in [("neo-Hookean", Material::BRAIN), ("St. Venant-Kirchhoff", kirchhoff)] {
+        for (method, material) in laws() {
             let body = cube(6, material);
             let mut solver = solver(&body, Config::default());
             let count = turn_over(&mut solver, &body, percent);
@@ -176,7 +182,7 @@ fn inverted(findings: &mut Findings) {
             let left = f64::from(last.inverted + last.non_finite);
             let scene = format!("{percent} % turned inside out");
             let wanted = method == "neo-Hookean";
-            if wanted || percent == 100 {
+            if wanted || percent == 100 && method == KIRCHHOFF {
                 verdict(scene, method, left == 0.0, wanted, ("inverted_share_percent", share), findings);
             } else {
                 let row = Row::new(scene, method).metric("inverted_count", left);
