@@ -62,6 +62,21 @@ impl Camera {
         self.distance_mm = (self.distance_mm * factor).clamp(2.0, 5000.0);
     }
 
+    /// Scales the distance by `factor`; the point at the target's depth under `at` (picture
+    /// coordinates from -1 to 1) keeps its place in the picture.
+    pub fn zoom_at(&mut self, factor: f32, at: Vec2, aspect: f32) {
+        let (view, before) = (self.view(aspect), self.distance_mm);
+        self.zoom(factor);
+        let off = at * view.half * (before - self.distance_mm);
+        self.target += off.x * view.right + off.y * view.up;
+    }
+
+    /// Moves eye and target to the right and upwards in the picture, mm.
+    pub fn pan(&mut self, right_mm: f32, up_mm: f32) {
+        let view = self.view(1.0);
+        self.target += right_mm * view.right + up_mm * view.up;
+    }
+
     /// The camera as vectors, for an aspect ratio (width over height).
     pub fn view(&self, aspect: f32) -> View {
         let elevation = self.elevation_rad.clamp(-STEEPEST_RAD, STEEPEST_RAD);
@@ -139,6 +154,18 @@ mod tests {
         camera.orbit(1.0, 9.0);
         let view = camera.view(2.0);
         assert!(view.right.is_normalized() && view.up.is_normalized() && view.up.dot(view.forward).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_zoom_keeps_what_is_under_the_pointer_and_a_pan_moves_it() {
+        let mut camera = Camera::viewed_from(Vec3::ONE, Vec3::new(0.4, 1.0, 0.2), 200.0);
+        let at = Vec2::new(0.6, -0.3);
+        let view = camera.view(1.5);
+        let point = view.eye + 200.0 / view.ray(at).dot(view.forward) * view.ray(at);
+        camera.zoom_at(0.5, at, 1.5);
+        assert!(camera.distance_mm == 100.0 && (camera.view(1.5).project(point).0 - at).length() < 1e-3);
+        camera.pan(10.0, 0.0);
+        assert!(camera.view(1.5).project(point).0.x < at.x - 0.1);
     }
 
     proptest! {

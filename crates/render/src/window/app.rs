@@ -1,12 +1,14 @@
 //! One picture of the window: input → session → renderer → panel.
 
 use super::capture::Captures;
+use super::guide::{Around, Guide};
 use super::input::{Pointer, ViewAndTool};
 use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
 use super::quality::Quality;
-use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, banner, timeline};
+use super::surface::{Ray, Surfaces};
+use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, timeline};
 use crate::{Frame, RenderError, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
@@ -22,6 +24,8 @@ enum Screen {
 
 /// Width of the side panel, points.
 const PANEL_WIDTH: f32 = 270.0;
+/// Longest time between pictures that the tool is led by, s.
+const LONGEST_S: f32 = 0.1;
 /// Scale of large type.
 const LARGE: f32 = 1.4;
 
@@ -50,7 +54,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         let hardware = lent.borrow().as_ref().and_then(|s| s.renderer.device()).is_some_and(|gpu| !gpu.is_software());
         Self {
             lent,
-            hand: ViewAndTool { world_from_tool: start.world_from_tool, camera: start.camera },
+            hand: ViewAndTool { world_from_tool: start.world_from_tool, camera: start.camera, guide: Guide::default() },
             traces: Traces::default(),
             panel: Panel::default(),
             clicks: Clicks::default(),
@@ -77,8 +81,8 @@ impl<S: Session, D: Draws> Window<S, D> {
         self.react(ui);
         self.update(ui, shared);
         egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
-            let (camera, filming) = (&mut self.hand.camera, self.captures.filming());
-            self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, camera, filming);
+            let filming = self.captures.filming();
+            self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, &mut self.hand, filming);
         });
         self.playback = self.panel.timeline.as_ref().and_then(|timeline| timeline::show(ui, timeline));
         let picture = egui::CentralPanel::default().frame(egui::Frame::NONE);
@@ -125,7 +129,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         let actions = self.panel.actions.iter().enumerate();
         let input = ui.input(|i| WindowInput {
             world_from_tool: self.hand.world_from_tool,
-            pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
+            pedal: i.key_down(egui::Key::Space) || self.clicks.pedal || self.hand.guide.pedal(),
             next_tool: requested(Command::NextTool),
             undo: requested(Command::Undo),
             chosen: self.clicks.chosen,
@@ -139,7 +143,6 @@ impl<S: Session, D: Draws> Window<S, D> {
         self.panel = shared.session.update(&input);
         #[cfg(feature = "sound")]
         self.panel.values.extend(self.audio.play(self.panel.sound).map(|why| ("sound".into(), why)));
-        self.panel.leash.into_iter().for_each(|leash| self.hand.hold(leash));
         let now = self.panel.timeline.as_ref().map_or(input.seconds, |timeline| timeline.at_s);
         self.traces.force.push(now, self.panel.force_n.into());
         self.traces.rate.push(now, self.panel.rate_hz.into());
@@ -157,21 +160,44 @@ impl<S: Session, D: Draws> Window<S, D> {
         self.drawn_at = now;
         let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
-        let frame = self.look.on(shared.session.frame(self.hand.camera));
+        let camera = self.hand.camera;
+        let frame = self.look.on(shared.session.frame(camera));
         match self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, self.quality.detail()) {
             Err(error) => shared.fault = Some(error.to_string()),
             Ok((view, id)) => {
-                let pointer = Pointer::over(ui, &response);
-                self.hand.follow(&pointer, &view, space.y);
-                // A focused slider takes the arrow keys.
-                if ui.memory(|memory| memory.focused().is_none()) {
-                    ui.input(|i| self.hand.keys(i, &view));
-                }
                 let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
                 ui.painter().image(id, area, whole, egui::Color32::WHITE);
+                self.lead(ui, &response, &view, &shared.session);
                 shared.shown = true;
             }
         }
+    }
+
+    /// Moves view and tool by pointer and keys, and draws where the tool will land.
+    fn lead(&mut self, ui: &egui::Ui, response: &egui::Response, view: &View, session: &S) {
+        let frame = self.look.on(session.frame(self.hand.camera));
+        let pointer = Pointer::over(ui, response, view);
+        self.hand.follow(&pointer, view, response.rect.height());
+        // A focused slider takes the arrow keys.
+        if ui.memory(|memory| memory.focused().is_none()) {
+            ui.input(|i| self.hand.keys(i, view));
+        }
+        let Some(tool) = frame.tool.filter(|_| self.panel.timeline.is_none()) else { return };
+        let cast = |ray: &Ray| session.surface(ray);
+        let around = Around {
+            surfaces: Surfaces::new(&cast, [frame.show_bone, frame.show_brain], frame.cut),
+            view,
+            tool,
+            world_from_tool: frame.world_from_tool,
+            dt_s: ui.input(|i| i.stable_dt).min(LONGEST_S),
+            pedal: ui.input(|i| i.key_down(egui::Key::Space)) || self.clicks.pedal,
+        };
+        let ViewAndTool { world_from_tool, guide, .. } = &mut self.hand;
+        guide.follow(world_from_tool, &pointer, &around);
+        if let Some(leash) = self.panel.leash {
+            self.hand.hold(leash, &around.surfaces, tool.tip_radius_mm);
+        }
+        aids::show(ui, response.rect, &around, &self.panel, self.hand.guide.is_pressed());
     }
 }
 

@@ -27,10 +27,12 @@
 //! Without a display: [`run`] returns an error and all arguments, so that the session can continue
 //! headless.
 
+mod aids;
 mod app;
 mod banner;
 mod capture;
 mod draws;
+mod guide;
 mod input;
 mod keys;
 mod look;
@@ -41,6 +43,7 @@ mod panel;
 mod panel_text;
 mod plot;
 mod quality;
+mod surface;
 #[cfg(any(feature = "sound", test))]
 mod synthesis;
 #[cfg(test)]
@@ -51,6 +54,7 @@ pub use capture::Capture;
 pub use draws::Draws;
 pub use input::WindowInput;
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
+pub use surface::{Ray, SurfaceHit};
 
 use crate::{Camera, Frame, Image, Renderer};
 use std::cell::RefCell;
@@ -65,6 +69,11 @@ pub trait Session {
 
     /// The frame to draw, seen by `camera`.
     fn frame(&self, camera: Camera) -> Frame<'_>;
+
+    /// The first surface that a ray meets from outside.
+    fn surface(&self, _ray: &Ray) -> Option<SurfaceHit> {
+        None
+    }
 
     /// Receives a screenshot of the whole window.
     fn capture(&mut self, what: Capture, picture: Image);

@@ -1,11 +1,12 @@
 //! The side panel: phase, force, rate, values, choices and buttons.
 
+use super::guide::{FEEDS, Guide};
+use super::input::ViewAndTool;
 use super::keys::{Command, label};
 use super::look::Look;
 use super::palette::{GREEN, ORANGE, PALE, SKY};
 use super::plot::{Drawn, Trace};
 use super::{Choice, Panel};
-use crate::Camera;
 use eframe::egui::{self, Color32, RichText};
 
 /// The clicks in the panel.
@@ -41,7 +42,7 @@ pub(crate) fn show(
     panel: &Panel,
     traces: &mut Traces,
     look: &mut Look,
-    camera: &mut Camera,
+    hand: &mut ViewAndTool,
     filming: bool,
 ) -> Clicks {
     let mut clicks = Clicks::default();
@@ -55,11 +56,14 @@ pub(crate) fn show(
         values(ui, panel);
         ui.separator();
         buttons(ui, panel, &mut clicks);
+        if panel.by_hand {
+            by_mouse(ui, &mut hand.guide);
+        }
         for (at, choice) in panel.choices.iter().enumerate() {
             clicks.chosen = options(ui, choice).map(|option| [at, option]).or(clicks.chosen);
         }
         ui.separator();
-        look.show(ui, camera);
+        look.show(ui, &mut hand.camera);
         ui.separator();
         if filming {
             ui.label(RichText::new("every picture of the window is saved").strong().color(ORANGE));
@@ -129,6 +133,14 @@ fn buttons(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
             clicks.actions |= 1 << at;
         }
     }
+}
+
+/// What the left button does.
+fn by_mouse(ui: &mut egui::Ui, guide: &mut Guide) {
+    ui.checkbox(&mut guide.drills, "The left button drills")
+        .on_hover_text("Held down on the skull, the left button lowers the tool, runs it and pushes it in");
+    let feed = egui::Slider::new(&mut guide.feed_mm_s, FEEDS).logarithmic(true).fixed_decimals(1).text("feed, mm/s");
+    ui.add(feed).on_hover_text("How fast the held button pushes the tool along its shaft");
 }
 
 /// The options of a choice; returns the one clicked.

@@ -16,11 +16,12 @@ use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
 use crate::show::picture::{Album, camera, frame, microscope, snap};
+use crate::show::raycast::Raycast;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_link::wire::TeacherRecord;
-use trepan_render::window::{self, Action, Capture, Leash, Panel, Start, WindowInput};
+use trepan_render::window::{self, Action, Capture, Leash, Panel, Ray, Start, SurfaceHit, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter};
 
 /// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
@@ -108,6 +109,7 @@ struct Show {
     ghost: Option<Pose>,
     requests: Requests,
     rate: Rate,
+    raycast: Raycast,
 }
 
 /// Recent requests, each with the time at which it expires, s.
@@ -162,6 +164,7 @@ pub(crate) fn show(
         ghost: None,
         requests: Requests::default(),
         rate: Rate::default(),
+        raycast: Raycast::of(opened.table),
     };
     let (show, album) = run(show, painter, opened, view);
     show.shown.finish(album)
@@ -213,6 +216,10 @@ impl<S: window::Session> window::Session for Counted<S> {
         self.session.frame(camera)
     }
 
+    fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.session.surface(ray)
+    }
+
     fn capture(&mut self, what: Capture, picture: Image) {
         self.session.capture(what, picture);
     }
@@ -229,6 +236,7 @@ impl window::Session for Show {
         if let Some(soft) = &mut self.inputs.soft {
             self.positions.clone_from(&soft.latest().0.positions);
         }
+        self.raycast.follow(&self.positions, self.view.sample.state.tip());
         self.send_pose(input);
         let lesson = self.exchange_requests(input);
         let view = &self.view;
@@ -262,6 +270,10 @@ impl window::Session for Show {
         let frame = self.shown.frame(camera, &self.view, &self.positions);
         let ghost = self.ghost.map(|pose| (self.view.sample.tool, pose));
         Frame { overlay: Overlay { ghost, markers: &self.markers, ..frame.overlay }, ..frame }
+    }
+
+    fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.raycast.cast(ray, &self.positions)
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {
@@ -386,6 +398,7 @@ mod tests {
             ghost: None,
             requests: Requests::default(),
             rate: Rate::default(),
+            raycast: Raycast::default(),
         };
         let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());

@@ -37,7 +37,7 @@ pub(crate) fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, rea
 }
 
 /// Returns the trilinear density, HU.
-fn density(bone: &BoneVolume, point: Vec3) -> f32 {
+pub(crate) fn density(bone: &BoneVolume, point: Vec3) -> f32 {
     let grid = bone.grid_of(point);
     let low = grid.floor();
     let t = grid - low;
