@@ -1,5 +1,6 @@
 //! One picture of the window: input → session → renderer → panel.
 
+use super::answers::{self, Answers};
 use super::capture::Captures;
 use super::guide::{Around, Guide};
 use super::input::{Pointer, ViewAndTool};
@@ -12,6 +13,7 @@ use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, a
 use crate::{Frame, RenderError, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
+use glam::Vec3;
 use std::time::Duration;
 
 /// How the picture gets into the window.
@@ -22,8 +24,9 @@ enum Screen {
     Copies(Option<egui::TextureHandle>),
 }
 
-/// Width of the side panel, points.
+/// First and least width of the side panel, points; at most half of the window.
 const PANEL_WIDTH: f32 = 270.0;
+const PANEL_LEAST: f32 = 180.0;
 /// Longest time between pictures that the tool is led by, s.
 const LONGEST_S: f32 = 0.1;
 /// Scale of large type.
@@ -39,6 +42,9 @@ pub(super) struct Window<S, D> {
     clicks: Clicks,
     look: Look,
     captures: Captures,
+    pub(super) answers: Answers,
+    /// The tool's tip as contact allows it, world mm.
+    tip: Vec3,
     help: bool,
     large: bool,
     playback: Option<Playback>,
@@ -46,7 +52,7 @@ pub(super) struct Window<S, D> {
     audio: super::loudspeaker::AudioOutput,
     screen: Screen,
     quality: Quality,
-    drawn_at: f64,
+    pub(super) drawn_at: f64,
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
@@ -61,6 +67,8 @@ impl<S: Session, D: Draws> Window<S, D> {
             look: Look::with(start.microscope),
             start,
             captures: Captures::default(),
+            answers: Answers::default(),
+            tip: start.world_from_tool.translation,
             help: false,
             large: false,
             playback: None,
@@ -80,14 +88,19 @@ impl<S: Session, D: Draws> Window<S, D> {
         self.captures.turn(ui.ctx(), &mut shared.session);
         self.react(ui);
         self.update(ui, shared);
-        egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
+        let widest = 0.5 * ui.available_width();
+        let side = egui::Panel::right("panel").default_size(PANEL_WIDTH.min(widest));
+        side.size_range(PANEL_LEAST.min(widest)..=widest).show(ui, |ui| {
             let filming = self.captures.filming();
             self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, &mut self.hand, filming);
         });
         self.playback = self.panel.timeline.as_ref().and_then(|timeline| timeline::show(ui, timeline));
         let picture = egui::CentralPanel::default().frame(egui::Frame::NONE);
         let over = picture.show(ui, |ui| self.picture(ui, state, shared)).response.rect;
-        banner::show(ui, over, &self.panel.warnings, &self.panel.news);
+        if let Some(playback) = self.playback {
+            self.answers.give(answers::played(playback), self.drawn_at);
+        }
+        banner::show(ui, over, &self.panel, self.answers.standing(self.drawn_at));
         if self.help {
             keys::help(ui.ctx(), &self.panel.actions);
         }
@@ -101,26 +114,50 @@ impl<S: Session, D: Draws> Window<S, D> {
     fn react(&mut self, ui: &egui::Ui) {
         let mut commands = std::mem::take(&mut self.clicks.commands);
         ui.input(|input| commands.extend(keys::pressed(input)));
+        let now = ui.input(|i| i.time);
+        if let Some(why) = ui.input(|i| answers::unused_key(i, &self.panel)) {
+            self.answers.give(why, now);
+        }
         for &command in &commands {
+            if let Some(why) = answers::refusal(command, &self.panel, &self.look) {
+                self.answers.give(format!("{}: {why}", keys::name(command)), now);
+                continue;
+            }
             match command {
                 Command::Reset => self.hand.camera = self.look.home(self.start.camera, self.start.microscope),
+                Command::FocusTool => self.hand.camera.target = self.tip,
+                Command::Withdraw => self.hand.guide.withdraws = true,
                 Command::Picture => self.captures.ask(),
                 Command::Film => self.captures.film(),
                 Command::Help => self.help ^= true,
                 Command::LargeType => self.enlarge(ui),
+                Command::Light => self.light(ui),
+                Command::FullScreen => self.fill(ui),
                 #[cfg(feature = "sound")]
                 Command::Mute => self.audio.muted ^= true,
                 Command::Quit if std::mem::take(&mut self.help) => (),
                 Command::Quit => ui.send_viewport_cmd(egui::ViewportCommand::Close),
                 of_view => self.look.react(of_view, &mut self.hand.camera),
             }
+            self.answers.give(answers::done(command, keys::name(command), &self.look, self.large), now);
         }
+        commands.retain(|command| answers::refusal(*command, &self.panel, &self.look).is_none());
         self.clicks.commands = commands;
     }
 
     fn enlarge(&mut self, ui: &egui::Ui) {
         self.large ^= true;
         ui.set_zoom_factor(if self.large { LARGE } else { 1.0 });
+    }
+
+    fn light(&mut self, ui: &egui::Ui) {
+        let dark = ui.visuals().dark_mode;
+        ui.set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
+    }
+
+    fn fill(&mut self, ui: &egui::Ui) {
+        let fills = ui.input(|i| i.viewport().fullscreen.unwrap_or(false));
+        ui.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!fills));
     }
 
     /// Updates the session.
@@ -132,8 +169,10 @@ impl<S: Session, D: Draws> Window<S, D> {
             pedal: i.key_down(egui::Key::Space) || self.clicks.pedal || self.hand.guide.pedal(),
             next_tool: requested(Command::NextTool),
             undo: requested(Command::Undo),
-            chosen: self.clicks.chosen,
+            redo: requested(Command::Redo),
+            chosen: self.clicks.chosen.or_else(|| self.numbered(i)),
             actions: actions
+                .filter(|(_, action)| action.why_not.is_none())
                 .filter(|(_, action)| keys::of_action(action).is_some_and(|key| i.key_pressed(key)))
                 .fold(self.clicks.actions, |bits, (at, _)| bits | 1 << at),
             playback: self.playback,
@@ -149,6 +188,14 @@ impl<S: Session, D: Draws> Window<S, D> {
         if self.panel.finished {
             ui.send_viewport_cmd(egui::ViewportCommand::Close);
         }
+    }
+
+    /// The tool whose number key was pressed.
+    fn numbered(&self, input: &egui::InputState) -> Option<[usize; 2]> {
+        let slot = answers::NUMBERS.iter().position(|key| input.key_pressed(*key))?;
+        let choice = self.panel.choices.first().filter(|choice| !choice.tools.is_empty())?;
+        let open = choice.options.get(slot).is_some_and(|(_, open)| *open) && choice.chosen != slot;
+        open.then_some([0, slot])
     }
 
     /// Draws the picture for an area of the window and shows it there.
@@ -192,6 +239,8 @@ impl<S: Session, D: Draws> Window<S, D> {
             dt_s: ui.input(|i| i.stable_dt).min(LONGEST_S),
             pedal: ui.input(|i| i.key_down(egui::Key::Space)) || self.clicks.pedal,
         };
+        self.tip = frame.world_from_tool.translation;
+        self.look.follow(&mut self.hand.camera, self.tip);
         let ViewAndTool { world_from_tool, guide, .. } = &mut self.hand;
         guide.follow(world_from_tool, &pointer, &around);
         if let Some(leash) = self.panel.leash {

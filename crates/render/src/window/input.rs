@@ -19,6 +19,8 @@ pub struct WindowInput {
     pub next_tool: bool,
     /// Whether an undo of the last stroke was requested since the last picture.
     pub undo: bool,
+    /// Whether a redo of the stroke undone last was requested since the last picture.
+    pub redo: bool,
     /// A selected option of a panel choice: index of the choice, index of the option.
     pub chosen: Option<[usize; 2]>,
     /// The panel's actions requested since the last picture, one bit each.

@@ -3,11 +3,16 @@
 //! # Practice
 //! | input | does |
 //! |---|---|
-//! | left drag | moves the tool on the plane of the picture; with Shift tilts its shaft |
-//! | wheel | pushes the tool in or pulls it out along the line of sight; with Ctrl zooms |
-//! | right drag | circles the camera around its target |
+//! | pointer | the tool flies over what is under it |
+//! | left button | lowers the tool, runs it and pushes at the set feed; dragged, slides on the surface |
+//! | Shift + left drag | tilts the shaft |
+//! | wheel | pushes the tool in or pulls it out along its shaft; with Ctrl zooms to the pointer |
+//! | right drag; middle drag or Shift + right drag | orbits; pans |
 //! | Space (held) | the drill's pedal |
-//! | N, U | the next tool; takes the last stroke back |
+//! | 1 to 9, N | takes a tool; the next tool |
+//! | U, Y, X | undoes a stroke; redoes it; draws the tool back |
+//! | D, F2 to F6 | centres the view on the tool; views from the front, back, left, right, top |
+//! | I, F11 | light or dark; full screen |
 //! | arrows, Page Up, Page Down | move the tool by half a millimetre |
 //! | + and -, R | zoom; back to the first view |
 //! | M | the microscope: a narrow field down on the opening |
@@ -28,6 +33,7 @@
 //! headless.
 
 mod aids;
+mod answers;
 mod app;
 mod banner;
 mod capture;
@@ -49,6 +55,7 @@ mod synthesis;
 #[cfg(test)]
 mod tests;
 mod timeline;
+mod tool_icon;
 
 pub use capture::Capture;
 pub use draws::Draws;
@@ -178,7 +185,7 @@ where
     let (lent, copies) = (lent.clone(), gpu.is_none());
     let show = || {
         let create: eframe::AppCreator<'_> = Box::new(move |context| {
-            context.egui_ctx.set_visuals(eframe::egui::Visuals::dark());
+            context.egui_ctx.set_theme(eframe::egui::Theme::Dark);
             Ok(Box::new(app::Window::new(lent, start, copies)))
         });
         eframe::run_native(title, options(gpu, &start), create)

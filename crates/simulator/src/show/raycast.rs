@@ -5,12 +5,14 @@
 //! brain's triangles are tested one by one: all of them for a line of sight, those around the tool
 //! for the short rays below it.
 
+use crate::program::Phase;
+use crate::run::View;
 use crate::session_setup::SessionSetup;
-use crate::stages::ahead::density;
+use crate::stages::ahead::{bone_ahead_mm, density};
 use std::sync::Arc;
-use trepan_geometry::{Aabb, Vec3};
+use trepan_geometry::{Aabb, Pose, Vec3};
 use trepan_mesh::Surface;
-use trepan_render::window::{Ray, SurfaceHit};
+use trepan_render::window::{Panel, Ray, SurfaceHit};
 use trepan_volume::BoneVolume;
 
 /// Distance from the tool within which short rays meet the brain, mm.
@@ -61,6 +63,25 @@ impl Raycast {
             false => None,
         };
         bone.into_iter().chain(brain).min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm))
+    }
+}
+
+/// Largest bone below a tool that is shown, mm.
+const BONE_MM: f32 = 30.0;
+
+impl Raycast {
+    /// Adds to a panel how much bone is left below the tool, and what can be undone and redone.
+    pub fn describe(&self, view: &View, panel: &mut Panel) {
+        let Some(bone) = &self.bone else { return };
+        let Pose { translation: tip, rotation, .. } = view.sample.state.world_from_tool;
+        if view.sample.phase() == Phase::Craniotomy && view.sample.tool.cutting_mm == 0.0 {
+            let down = rotation * Vec3::NEG_Z;
+            let left_mm = bone_ahead_mm(bone, tip + view.sample.tool.tip_radius_mm * down, down, BONE_MM);
+            let text = if left_mm < BONE_MM { format!("{left_mm:.1} mm") } else { "over 30 mm".into() };
+            panel.task.insert(0, ("bone left".into(), text));
+        }
+        panel.no_undo = (bone.strokes() == 0).then(|| "there is no stroke to undo".into());
+        panel.no_redo = (bone.undone_strokes() == 0).then(|| "no stroke was undone since the last one".into());
     }
 }
 

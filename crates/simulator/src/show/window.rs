@@ -110,6 +110,8 @@ struct Show {
     requests: Requests,
     rate: Rate,
     raycast: Raycast,
+    /// Whether no flap is planned.
+    no_flap: bool,
 }
 
 /// Recent requests, each with the time at which it expires, s.
@@ -165,6 +167,7 @@ pub(crate) fn show(
         requests: Requests::default(),
         rate: Rate::default(),
         raycast: Raycast::of(opened.table),
+        no_flap: opened.table.plan.outline.is_empty(),
     };
     let (show, album) = run(show, painter, opened, view);
     show.shown.finish(album)
@@ -241,9 +244,15 @@ impl window::Session for Show {
         let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
-        let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
+        let flap = || Action {
+            name: "Lift the flap, or put it back".into(),
+            key: Some('f'),
+            why_not: self.no_flap.then(|| "no flap is planned: start with --flap and its diameter, mm".into()),
+            ..Action::default()
+        };
         let mut panel = self.shown.panel(view, by_hand);
         panel.warnings.extend(lesson.warnings);
+        self.raycast.describe(view, &mut panel);
         // A watcher reads that the other session has ended, and closes the window herself.
         let over = self.company.watching.as_ref().and_then(Watching::ended);
         let finished = match over {
@@ -288,6 +297,7 @@ impl Show {
         let buttons = [
             input.next_tool.then_some(Buttons::NEXT_TOOL),
             input.undo.then_some(Buttons::UNDO),
+            input.redo.then_some(Buttons::REDO),
             (input.actions & 1 != 0).then_some(Buttons::FLAP),
             input.chosen.map(|[_, slot]| Buttons::slot(slot)),
         ];
@@ -352,8 +362,12 @@ fn teach(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
     }
     teacher.send(input.world_from_tool);
     let flags = teacher.requests().flags;
-    let switch =
-        |(name, key, bit): (&str, char, u32)| Action { name: name.into(), key: Some(key), on: flags & bit != 0 };
+    let switch = |(name, key, bit): (&str, char, u32)| Action {
+        name: name.into(),
+        key: Some(key),
+        on: flags & bit != 0,
+        why_not: None,
+    };
     Lesson { actions: SWITCHES.map(switch).into(), ..Lesson::default() }
 }
 
@@ -399,6 +413,7 @@ mod tests {
             requests: Requests::default(),
             rate: Rate::default(),
             raycast: Raycast::default(),
+            no_flap: true,
         };
         let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());
@@ -418,6 +433,7 @@ mod tests {
             pedal: false,
             next_tool: false,
             undo: false,
+            redo: false,
             chosen: None,
             actions: 0,
             playback: None,
