@@ -33,7 +33,7 @@ const LANDING_MM_S: f32 = 25.0;
 /// Speed along a surface, mm/s, and while the tool cuts.
 const SLIDE_MM_S: [f32; 2] = [40.0, 4.0];
 /// Largest lead of the hand over the tool while it pushes, mm.
-const FEED_LEAD_MM: f32 = 1.2;
+const FEED_LEAD_MM: f32 = 2.0;
 /// Depth of the hand past a surface along which it slides, mm.
 const SKIM_MM: f32 = 0.3;
 /// Depth of the centre of a craniotome's foot below the bone, mm.
@@ -101,7 +101,7 @@ pub(crate) struct Guide {
     /// Whether the tool is being drawn back.
     pub withdraws: bool,
     /// The surface under the pointer and its smoothed normal.
-    goal: Option<(Vec3, Vec3)>,
+    goal: Option<(Vec3, Option<Vec3>)>,
     press: Option<Press>,
     tilted: bool,
     /// Distance that the pointer must still move before the tool follows it, points.
@@ -162,10 +162,10 @@ impl Guide {
     }
 
     /// The surface under the pointer and its smoothed normal.
-    fn under(&self, pointer: &Pointer, around: &Around<'_>) -> Option<(Vec3, Vec3)> {
+    fn under(&self, pointer: &Pointer, around: &Around<'_>) -> Option<(Vec3, Option<Vec3>)> {
         let (eye, along) = (around.view.eye, around.view.ray(pointer.at?));
-        let (point, hit) = around.surfaces.seen(eye, along)?;
-        Some((point, around.surfaces.smooth_normal(point, hit.normal, SMOOTH_MM)))
+        let (point, _) = around.surfaces.seen(eye, along)?;
+        Some((point, around.surfaces.smooth_normal(point, along, SMOOTH_MM)))
     }
 
     /// The press after this picture; a release lets the tool rise, or rest in its cut.
@@ -258,7 +258,7 @@ impl Guide {
         if self.withdraws && clear(hand) && (hand.translation - tip).length() < CLEARANCE_MM {
             self.withdraws = false;
         }
-        if let Some((_, normal)) = self.goal.filter(|_| !self.tilted && clear(hand)) {
+        if let Some((_, Some(normal))) = self.goal.filter(|_| !self.tilted && clear(hand)) {
             let turn = Quat::from_rotation_arc(up, normal);
             let angle = turn.to_axis_angle().1.max(1e-6);
             let share = (TURN_RAD_S * around.dt_s / angle).min(1.0);

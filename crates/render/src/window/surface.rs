@@ -93,20 +93,25 @@ impl<'a> Surfaces<'a> {
         (2 * heights.len() > RING).then(|| heights[heights.len() / 2])
     }
 
-    /// The normal of the surface around a point, smoothed over a disc of some millimetres.
-    pub fn smooth_normal(&self, point: Vec3, normal: Vec3, radius_mm: f32) -> Vec3 {
-        let height = |aside: Vec3| {
-            let hit = self.ahead(point + aside + 15.0 * normal, -normal, 30.0)?;
-            Some(point + aside + (15.0 - hit.distance_mm) * normal)
+    /// The normal of the surface around a point on a line of sight, from a ring of rays beside it:
+    /// a hole at the point does not turn it. `None` at an edge of the surface.
+    pub fn smooth_normal(&self, point: Vec3, along: Vec3, radius_mm: f32) -> Option<Vec3> {
+        let meet = |aside: Vec3| {
+            let from = point + aside - ABOVE_MM * along;
+            let hit = self.ahead(from, along, ABOVE_MM + BELOW_MM)?;
+            Some(from + hit.distance_mm * along)
         };
-        let around: Vec<Vec3> = ring(normal, radius_mm).filter_map(height).collect();
+        let around: Vec<Vec3> = ring(along, radius_mm).filter_map(meet).collect();
         if around.len() < RING {
-            return normal;
+            return None;
         }
+        let middle = around.iter().sum::<Vec3>() / RING as f32;
         let next = around.iter().cycle().skip(1);
-        let area: Vec3 = around.iter().zip(next).map(|(a, b)| (*a - point).cross(*b - point)).sum();
-        let smooth = area.normalize_or(normal);
-        if smooth.dot(normal) < 0.0 { -smooth } else { smooth }
+        let area: Vec3 = around.iter().zip(next).map(|(a, b)| (*a - middle).cross(*b - middle)).sum();
+        let normal = area.try_normalize()?;
+        let normal = if normal.dot(along) > 0.0 { -normal } else { normal };
+        let is_flat = |at: &Vec3| (*at - middle).dot(normal).abs() < 0.5 * radius_mm;
+        around.iter().all(is_flat).then_some(normal)
     }
 }
 
@@ -170,7 +175,9 @@ pub(crate) mod tests {
         let inner = surfaces.inner(Vec3::new(20.0, 0.0, -6.0), Vec3::Z, 2.0).unwrap();
         assert!(inner.abs() < 1e-3);
         assert_eq!(surfaces.inner(Vec3::new(0.0, 0.0, -6.0), Vec3::Z, 2.0), None, "no bone around it");
-        let normal = surfaces.smooth_normal(Vec3::new(20.0, 0.0, 0.0), Vec3::new(0.1, 0.0, 1.0).normalize(), 6.0);
-        assert!((normal - Vec3::Z).length() < 1e-3);
+        let along = Vec3::new(0.3, 0.0, -1.0).normalize();
+        let normal = |x: f32, z: f32| surfaces.smooth_normal(Vec3::new(x, 0.0, z), along, 6.0).unwrap();
+        assert!((normal(20.0, 0.0) - Vec3::Z).length() < 1e-3);
+        assert!((normal(0.0, -3.0) - Vec3::Z).length() < 0.05, "over the wall of the hole: {}", normal(0.0, -3.0));
     }
 }

@@ -66,8 +66,15 @@ impl Raycast {
     }
 }
 
-/// Largest bone below a tool that is shown, mm.
-const BONE_MM: f32 = 30.0;
+/// Largest distance to bone below a tool, and largest thickness of it, mm.
+const BONE_MM: [f32; 2] = [100.0, 25.0];
+
+/// Returns the thickness of the bone along a direction from a point, mm; 0 where there is none.
+fn below_mm(bone: &BoneVolume, from: Vec3, along: Vec3) -> f32 {
+    let ray = Ray { from, along, reach_mm: BONE_MM[0], bone: true, brain: false };
+    let over_mm = of_bone(bone, &ray).map_or(0.0, |hit| hit.distance_mm);
+    bone_ahead_mm(bone, from + over_mm * along, along, BONE_MM[1])
+}
 
 impl Raycast {
     /// Adds to a panel how much bone is left below the tool, and what can be undone and redone.
@@ -76,9 +83,8 @@ impl Raycast {
         let Pose { translation: tip, rotation, .. } = view.sample.state.world_from_tool;
         if view.sample.phase() == Phase::Craniotomy && view.sample.tool.cutting_mm == 0.0 {
             let down = rotation * Vec3::NEG_Z;
-            let left_mm = bone_ahead_mm(bone, tip + view.sample.tool.tip_radius_mm * down, down, BONE_MM);
-            let text = if left_mm < BONE_MM { format!("{left_mm:.1} mm") } else { "over 30 mm".into() };
-            panel.task.insert(0, ("bone left".into(), text));
+            let front = tip + view.sample.tool.tip_radius_mm * down;
+            panel.task.insert(0, ("bone below the tool".into(), format!("{:.1} mm", below_mm(bone, front, down))));
         }
         panel.no_undo = (bone.strokes() == 0).then(|| "there is no stroke to undo".into());
         panel.no_redo = (bone.undone_strokes() == 0).then(|| "no stroke was undone since the last one".into());
@@ -156,6 +162,8 @@ mod tests {
         let slanted = of_bone(&bone, &ray(Vec3::new(0.0, 0.0, 10.0), Vec3::new(0.5, 0.0, -1.0))).unwrap();
         assert!((slanted.distance_mm - (10.0 - top) * 1.25f32.sqrt()).abs() < 0.1, "{slanted:?}");
         assert_eq!(of_bone(&bone, &ray(Vec3::new(0.2, 0.1, -4.0), Vec3::NEG_Z)), None, "from within");
+        let below = |z: f32| below_mm(&bone, Vec3::new(0.2, 0.1, z), Vec3::NEG_Z);
+        assert!((below(40.0) - 6.0).abs() < 0.2 && (below(-4.0) - 3.5).abs() < 0.2, "{} {}", below(40.0), below(-4.0));
         for n in 0..30 * 25 {
             bone.set_hu(IVec3::new(13 + n % 5, 13 + n / 5 % 5, n / 25), AIR_HU);
         }
