@@ -2,7 +2,7 @@
 //!
 //! # Theory
 //! ```text
-//! pointer moves       the tool flies CLEARANCE_MM over what is under the pointer; first up, then across
+//! pointer moves       the tool flies CLEARANCE_MM over what is under it; first up, then across
 //! left button down    it comes down; at the surface a cutting tool begins to turn
 //!   held still        the hand advances along the shaft at the set feed, FEED_LEAD_MM at most
 //!                     ahead of the tool: the spring between the two is the pressure

@@ -4,7 +4,7 @@
 //! | input | does |
 //! |---|---|
 //! | pointer | the tool flies over what is under it |
-//! | left button | lowers the tool, runs it and pushes at the set feed; dragged, slides on the surface |
+//! | left button | lowers the tool, runs it, pushes at the set feed; a drag slides along |
 //! | Shift + left drag | tilts the shaft |
 //! | wheel | pushes the tool in or pulls it out along its shaft; with Ctrl zooms to the pointer |
 //! | right drag; middle drag or Shift + right drag | orbits; pans |

@@ -427,7 +427,7 @@ fn every_key_answers_on_screen_whether_it_applies_or_not() {
         no_drill: refused,
         ..Panel::default()
     };
-    // Keys that move tool or view at once, or belong to the focused control, and those of the system.
+    // Keys that move tool or view at once, or belong to the focused control.
     let moves = "ArrowDown ArrowLeft ArrowRight ArrowUp PageUp PageDown Plus Minus Equals Tab Enter Home End";
     for panel in [by_hand, Panel { choices: vec![choice], ..Panel::default() }] {
         let mut bench = Bench::with(panel);

@@ -81,10 +81,12 @@ impl Raycast {
     pub fn describe(&self, view: &View, panel: &mut Panel) {
         let Some(bone) = &self.bone else { return };
         let Pose { translation: tip, rotation, .. } = view.sample.state.world_from_tool;
-        if view.sample.phase() == Phase::Craniotomy && view.sample.tool.cutting_mm == 0.0 {
-            let down = rotation * Vec3::NEG_Z;
-            let front = tip + view.sample.tool.tip_radius_mm * down;
-            panel.task.insert(0, ("bone below the tool".into(), format!("{:.1} mm", below_mm(bone, front, down))));
+        let (tool, down) = (view.sample.tool, rotation * Vec3::NEG_Z);
+        // The line stays with every tool for bone, so that no button below it moves.
+        if view.sample.phase() == Phase::Craniotomy {
+            let left_mm = below_mm(bone, tip + tool.tip_radius_mm * down, down);
+            let text = if tool.cutting_mm > 0.0 { "cuts aside".into() } else { format!("{left_mm:.1} mm") };
+            panel.task.insert(0, ("bone below the tool".into(), text));
         }
         panel.no_undo = (bone.strokes() == 0).then(|| "there is no stroke to undo".into());
         panel.no_redo = (bone.undone_strokes() == 0).then(|| "no stroke was undone since the last one".into());
