@@ -3,10 +3,11 @@
 use super::answers::{self, Answers};
 use super::capture::Captures;
 use super::guide::{Around, Guide};
-use super::input::{Pointer, ViewAndTool};
+use super::input::ViewAndTool;
 use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
+use super::pointer::Pointer;
 use super::quality::Quality;
 use super::surface::{Ray, Surfaces};
 use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, timeline};

@@ -16,7 +16,7 @@
 //! In free air the shaft turns to the smoothed normal of the surface, until the user tilts it. The
 //! window's leash holds after all of this: the hand is never deeper past a surface than the leash.
 
-use super::input::Pointer;
+use super::pointer::Pointer;
 use super::surface::Surfaces;
 use crate::View;
 use glam::{Quat, Vec2, Vec3};

@@ -48,6 +48,7 @@ mod palette;
 mod panel;
 mod panel_text;
 mod plot;
+mod pointer;
 mod quality;
 mod surface;
 #[cfg(any(feature = "sound", test))]

@@ -93,8 +93,8 @@ impl<'a> Surfaces<'a> {
         (2 * heights.len() > RING).then(|| heights[heights.len() / 2])
     }
 
-    /// The normal of the surface around a point on a line of sight, from a ring of rays beside it:
-    /// a hole at the point does not turn it. `None` at an edge of the surface.
+    /// The normal of the surface around a point on a line of sight. It comes from a ring of rays
+    /// beside that line, so a hole at the point does not turn it; `None` at an edge.
     pub fn smooth_normal(&self, point: Vec3, along: Vec3, radius_mm: f32) -> Option<Vec3> {
         let meet = |aside: Vec3| {
             let from = point + aside - ABOVE_MM * along;
@@ -134,8 +134,7 @@ fn ring(axis: Vec3, radius_mm: f32) -> impl Iterator<Item = Vec3> {
 pub(crate) mod tests {
     use super::*;
 
-    /// A slab of bone with its faces at z = 0 and -6, with a hole of 3 mm radius along the z axis;
-    /// the brain below -7.
+    /// A slab of bone from z = -6 to 0 mm with a hole of 3 mm radius. The brain lies below -7 mm.
     pub fn slab(ray: &Ray) -> Option<SurfaceHit> {
         let plane = |z: f32, normal: Vec3, holds: &dyn Fn(Vec3) -> bool| {
             let distance_mm = (z - ray.from.z) / ray.along.z;
