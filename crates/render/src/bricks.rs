@@ -14,6 +14,7 @@
 //! distances are recomputed, at about 0.1 µs a brick.
 
 use crate::drilled::{Drilled, LEAP};
+use crate::smooth;
 use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
@@ -37,6 +38,8 @@ pub(crate) struct Grid {
     pub isovalue: i16,
     /// Steps of the cut's lattice along a voxel's edge.
     pub steps: usize,
+    /// Voxels from one point of the smoothed CT's lattice to the next.
+    pub smooth_step: usize,
 }
 
 /// Free distances from each brick.
@@ -67,7 +70,14 @@ impl Grid {
     /// The grid of a bone volume; without bone, eight voxels of air.
     pub fn of(bone: Option<&BoneVolume>) -> Self {
         let Some(bone) = bone else {
-            return Self { dims: [2; 3], origin: Vec3::ZERO, spacing_mm: 1.0, isovalue: i16::MAX, steps: 1 };
+            return Self {
+                dims: [2; 3],
+                origin: Vec3::ZERO,
+                spacing_mm: 1.0,
+                isovalue: i16::MAX,
+                steps: 1,
+                smooth_step: 1,
+            };
         };
         Self {
             dims: bone.dims().map(|n| n + 2),
@@ -75,6 +85,7 @@ impl Grid {
             spacing_mm: bone.spacing_mm(),
             isovalue: bone.isovalue(),
             steps: 2 * bone.cut_nodes() as usize,
+            smooth_step: smooth::step(bone.spacing_mm()),
         }
     }
 
