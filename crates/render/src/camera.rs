@@ -35,8 +35,9 @@ pub struct View {
     pub forward: Vec3,
     /// Half the picture's width and height at distance 1.
     pub half: Vec2,
-    /// Offset of the picture's centre to the left at distance 1; nonzero only for one eye of two.
-    pub shear: f32,
+    /// Offset of the picture's centre to the left and down at distance 1; nonzero for one eye of
+    /// two, and within a pixel to smooth edges.
+    pub shear: Vec2,
 }
 
 const STEEPEST_RAD: f32 = 1.55;
@@ -75,7 +76,7 @@ impl Camera {
             up: back.cross(right),
             forward: -back,
             half: Vec2::new(half * aspect, half),
-            shear: 0.0,
+            shear: Vec2::ZERO,
         }
     }
 }
@@ -89,12 +90,20 @@ impl View {
     /// The view from an eye `offset_mm` to the right, with zero parallax at `distance_mm`: an
     /// off-axis frustum without keystone distortion.
     pub fn from_aside(&self, offset_mm: f32, distance_mm: f32) -> Self {
-        Self { eye: self.eye + offset_mm * self.right, shear: offset_mm / distance_mm.max(Self::NEAR_MM), ..*self }
+        let shear = self.shear + Vec2::X * (offset_mm / distance_mm.max(Self::NEAR_MM));
+        Self { eye: self.eye + offset_mm * self.right, shear, ..*self }
+    }
+
+    /// The view whose pixels have their centres `by` pixels further right and down, in a picture of
+    /// `size` pixels.
+    pub(crate) fn moved(&self, by: Vec2, size: [u32; 2]) -> Self {
+        let pixel = 2.0 * self.half / Vec2::from(size.map(|n| n as f32));
+        Self { shear: self.shear + by * Vec2::new(-1.0, 1.0) * pixel, ..*self }
     }
 
     /// Direction of the picture's centre; length 1 along `forward`.
     pub(crate) fn middle(&self) -> Vec3 {
-        self.forward - self.shear * self.right
+        self.forward - self.shear.x * self.right - self.shear.y * self.up
     }
 
     /// Unit direction of the ray through a point of the picture, each coordinate from -1 (left,
@@ -107,8 +116,8 @@ impl View {
     pub fn project(&self, point: Vec3) -> (Vec2, f32) {
         let from = point - self.eye;
         let depth = from.dot(self.forward);
-        let across = from.dot(self.right) + self.shear * depth;
-        (Vec2::new(across, from.dot(self.up)) / (self.half * depth), depth)
+        let across = Vec2::new(from.dot(self.right), from.dot(self.up)) + self.shear * depth;
+        (across / (self.half * depth), depth)
     }
 
     /// The projection matrix for triangles.
@@ -116,7 +125,7 @@ impl View {
         let aspect = self.half.x / self.half.y;
         let clip_from_eye =
             glam::camera::rh::proj::directx::perspective(2.0 * self.half.y.atan(), aspect, Self::NEAR_MM, Self::FAR_MM);
-        let sheared = Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::Z, Vec4::new(self.shear / self.half.x, 0.0, 0.0, 1.0));
+        let sheared = Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::Z, (self.shear / self.half).extend(0.0).extend(1.0));
         sheared * clip_from_eye * glam::camera::rh::view::look_to_mat4(self.eye, self.forward, self.up)
     }
 }
@@ -147,6 +156,8 @@ mod tests {
             let camera = Camera { target: Vec3::new(3.0, -8.0, 5.0), azimuth_rad: azimuth, elevation_rad: elevation, distance_mm: 200.0, fov_rad: 0.7 };
             let view = camera.view(1.4).from_aside(aside, camera.distance_mm);
             prop_assert!(view.project(camera.target).0.length() < 1e-4);
+            let view = view.moved(Vec2::new(0.4, -0.3), [14, 10]);
+            prop_assert!((view.project(camera.target).0 - Vec2::new(-0.8 / 14.0, -0.06)).length() < 1e-4);
             let point = Vec3::new(x, y, z);
             let (at, depth) = view.project(point);
             let clip = view.clip_from_world() * point.extend(1.0);

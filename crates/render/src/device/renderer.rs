@@ -158,6 +158,11 @@ impl Renderer {
         contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))
     }
 
+    /// Whether bone has changed since the last picture.
+    pub fn is_stale(&mut self) -> bool {
+        self.passes.skull.is_stale()
+    }
+
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         self.divide(Division { size, ..self.canvas.division })

@@ -20,6 +20,7 @@ mod brain;
 mod bricks;
 mod contour;
 mod drilled;
+mod edges;
 mod eye;
 mod light;
 mod line;
@@ -161,6 +162,32 @@ impl ProcessorRenderer {
         }
         self.eyes = eyes;
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
+    }
+
+    /// Smooths the edges of the 3-D view by one more sample of a pixel; returns whether there was
+    /// one to add. `frame` must be the one that was drawn last. With stereo edges stay as they are.
+    pub fn refine(&mut self, frame: &Frame) -> bool {
+        let mut eyes = std::mem::take(&mut self.eyes);
+        let added = match &mut eyes[..] {
+            [eye] if !eye.is_smooth() => {
+                let view = eye.next_view(&eye_view(frame, eye.area, 0));
+                let mri_from_world = self.mri.as_ref().map(|m| m.texture_from_world);
+                let scene = Scene::of(frame, &view, eye.size(), &self.bricks.grid, mri_from_world);
+                let (items, _) = items(&frame.overlay, view.eye);
+                let brain = self.brain.as_ref().filter(|_| frame.show_brain);
+                eye.refine(&self.inputs(frame, &scene), brain, frame.show_bone, &view, &items, self.threads);
+                eye.show(&mut self.picture, false);
+                true
+            }
+            _ => false,
+        };
+        self.eyes = eyes;
+        added
+    }
+
+    /// Whether bone has changed since the last picture.
+    pub fn is_stale(&mut self) -> bool {
+        self.bricks.is_stale()
     }
 
     fn inputs<'a>(&'a self, frame: &Frame<'a>, scene: &'a Scene) -> Inputs<'a> {
