@@ -20,6 +20,17 @@ pub trait Draws {
     /// Like [`draw`](Self::draw), but returns a finished picture for a window on another device. It
     /// may have fewer pixels.
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError>;
+
+    /// Smooths the edges of the last finished picture by one more sample; `None` if there is none to
+    /// add.
+    fn refine(&mut self, _frame: &Frame) -> Option<Image> {
+        None
+    }
+
+    /// Whether bone has changed since the last picture.
+    fn is_stale(&mut self) -> bool {
+        false
+    }
 }
 
 impl Draws for Renderer {
@@ -40,6 +51,10 @@ impl Draws for Renderer {
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
         let view = Draws::draw(self, frame, size, detail)?;
         Ok((view, self.image()?))
+    }
+
+    fn is_stale(&mut self) -> bool {
+        Renderer::is_stale(self)
     }
 }
 
@@ -63,5 +78,13 @@ impl Draws for Painter {
         self.fit(size, detail)?;
         let (image, _) = Painter::picture(self, frame)?;
         Ok((self.view(frame), image))
+    }
+
+    fn refine(&mut self, frame: &Frame) -> Option<Image> {
+        Painter::refine(self, frame)
+    }
+
+    fn is_stale(&mut self) -> bool {
+        Painter::is_stale(self)
     }
 }
