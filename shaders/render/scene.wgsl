@@ -13,7 +13,7 @@ struct Scene {
     tip: vec4f,               // centre of the tool's ball; w: its radius (negative: no tool)
     tail: vec4f,              // far end of the shaft; w: its radius
     light: vec4f,             // unit, towards the light; w: 1 while drilling
-    spin: vec4f,              // unit, across the shaft: turns with the burr
+    spin: vec4f,              // unit, across the shaft: turns with the burr; w: share of a sample in the mean
     second_tip: vec4f,        // the tool in the other hand, as `tip`
     second_tail: vec4f,       // as `tail`
     brain_cut: vec4f,         // unit normal and offset of the plane over which the brain is cut away; zeroes: none

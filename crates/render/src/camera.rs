@@ -42,6 +42,13 @@ pub struct View {
 
 const STEEPEST_RAD: f32 = 1.55;
 
+/// Samples of a pixel at rest.
+pub(crate) const SAMPLES: usize = 16;
+
+/// The 4 x 4 places of a pixel in the order in which they are taken: that of Bayer's matrix, so that
+/// any first few lie far apart.
+const ORDER: [u8; SAMPLES] = [0, 10, 2, 8, 5, 15, 7, 13, 1, 11, 3, 9, 4, 14, 6, 12];
+
 impl Camera {
     /// An eye at `distance_mm` from `target` in the direction `towards_eye` (any length; zero means
     /// from the front).
@@ -94,9 +101,15 @@ impl View {
         Self { eye: self.eye + offset_mm * self.right, shear, ..*self }
     }
 
+    /// The view of the `n`th sample of the pixels of a picture of `size` pixels, of [`SAMPLES`].
+    pub(crate) fn sample(&self, n: usize, size: [u32; 2]) -> Self {
+        let place = ORDER[n % SAMPLES];
+        self.moved(Vec2::new(f32::from(place % 4), f32::from(place / 4)) * 0.25 - 0.375, size)
+    }
+
     /// The view whose pixels have their centres `by` pixels further right and down, in a picture of
     /// `size` pixels.
-    pub(crate) fn moved(&self, by: Vec2, size: [u32; 2]) -> Self {
+    fn moved(&self, by: Vec2, size: [u32; 2]) -> Self {
         let pixel = 2.0 * self.half / Vec2::from(size.map(|n| n as f32));
         Self { shear: self.shear + by * Vec2::new(-1.0, 1.0) * pixel, ..*self }
     }
@@ -148,6 +161,22 @@ mod tests {
         camera.orbit(1.0, 9.0);
         let view = camera.view(2.0);
         assert!(view.right.is_normalized() && view.up.is_normalized() && view.up.dot(view.forward).abs() < 1e-5);
+    }
+
+    #[test]
+    fn every_sample_is_taken_once_within_its_pixel() {
+        let mut places: Vec<u8> = ORDER.into();
+        places.sort_unstable();
+        assert!(places.into_iter().eq(0..16));
+        let view = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 100.0).view(1.0);
+        let mut middle = Vec2::ZERO;
+        for n in 0..SAMPLES {
+            // Where the middle of the moved picture is in the picture, in pixels.
+            let at = view.project(view.eye + 50.0 * view.sample(n, [10, 10]).ray(Vec2::ZERO)).0 * 5.0;
+            assert!(at.abs().max_element() < 0.38, "{at}");
+            middle += at / SAMPLES as f32;
+        }
+        assert!(middle.length() < 1e-3, "{middle}");
     }
 
     proptest! {

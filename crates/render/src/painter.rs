@@ -115,11 +115,19 @@ impl Painter {
     }
 
     /// Smooths the edges of the last picture, of the same frame, by one more sample of a pixel;
-    /// `None` if there is none to add. The processor alone does so.
-    pub fn refine(&mut self, frame: &Frame) -> Option<Image> {
+    /// returns whether there was one to add.
+    pub fn refine(&mut self, frame: &Frame) -> Result<bool, RenderError> {
         match &mut self.by {
-            By::Processor(processor) => processor.refine(frame).then(|| processor.image().enlarged(self.quality.size)),
-            By::Device(_) => None,
+            By::Processor(processor) => Ok(processor.refine(frame)),
+            By::Device(renderer) => renderer.refine(frame),
+        }
+    }
+
+    /// The last picture, as it is now.
+    pub fn image(&self) -> Result<Image, RenderError> {
+        match &self.by {
+            By::Processor(processor) => Ok(processor.image().enlarged(self.quality.size)),
+            By::Device(renderer) => renderer.image(),
         }
     }
 

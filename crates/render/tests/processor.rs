@@ -265,6 +265,16 @@ fn edges_at_rest_are_those_of_a_picture_with_sixteen_samples_a_pixel() {
     println!("error against 16 samples: {sharp:.2} %, smoothed {smooth:.2} %");
     assert_eq!(samples, 16);
     assert!(smooth < 0.5 && sharp > 2.0 * smooth, "{sharp} %, smoothed {smooth} %");
+    if let Some(gpu) = device() {
+        let mut on_device = scene::renderer(&gpu, &data, [160, 120]);
+        on_device.draw(&frame).expect("drawn");
+        let samples = (0..99).take_while(|_| on_device.refine(&frame).expect("drawn")).count();
+        let smooth = on_device.image().expect("read").error_percent(&reference);
+        println!("on the device {smooth:.2} %");
+        assert!(samples == 16 && smooth < 0.5, "{samples} samples, {smooth} %");
+        on_device.draw(&frame).expect("drawn");
+        assert!(on_device.image().expect("read").error_percent(&reference) > 2.0 * smooth, "a new picture begins anew");
+    }
     // What was smoothed is not taken for a surface.
     assert_eq!(renderer.bone_hits(), hits);
     let moved = Frame { camera: Camera { azimuth_rad: frame.camera.azimuth_rad + 0.1, ..frame.camera }, ..frame };

@@ -3,25 +3,17 @@
 //!
 //! # Theory
 //! A pixel within smooth bone looks the same wherever in it a ray passes. One at an edge is the
-//! mean over its area: of 4 x 4 places, taken in the order of Bayer's matrix, so that any first few
-//! lie far apart.
+//! mean over its area: of the 4 x 4 places of [`View::sample`](crate::View).
 //!
 //! # Practice
 //! One place for all edges a call. Their colours are averaged as bytes, as a screen shows them. A
 //! tenth of the pixels are at an edge, so all 16 places take less than two pictures.
 
-use crate::camera::View;
-use glam::Vec2;
-
-/// Places in a pixel.
-pub(crate) const PLACES: usize = 16;
+use crate::camera::SAMPLES;
 
 /// A numerical parameter: difference of a colour from a neighbour's at which there is an edge, of
 /// 255.
 const EDGE: u8 = 6;
-
-/// The places of a pixel in the order in which they are taken.
-const ORDER: [u8; PLACES] = [0, 10, 2, 8, 5, 15, 7, 13, 1, 11, 3, 9, 4, 14, 6, 12];
 
 /// The pixels at edges, and what was seen through them.
 #[derive(Debug, Default)]
@@ -57,18 +49,11 @@ impl Edges {
         Self { pixels, centres, sums, taken: 0 }
     }
 
-    /// The view whose pixel centres are the next places, of a picture of `size` pixels.
-    pub fn next_view(&self, view: &View, size: [u32; 2]) -> View {
-        let n = ORDER[self.taken % PLACES];
-        let place = Vec2::new(f32::from(n % 4), f32::from(n / 4)) * 0.25 - 0.375;
-        view.moved(place, size)
-    }
-
     /// Adds the colours through the next places, and writes the means into a picture.
     pub fn add(&mut self, colours: &[[u8; 4]], picture: &mut [[u8; 4]]) {
         self.taken += 1;
         // Until all are there the centre is one of them.
-        let with_centre = u16::from(self.taken < PLACES);
+        let with_centre = u16::from(self.taken < SAMPLES);
         let count = self.taken as u16 + with_centre;
         for (n, &at) in self.pixels.iter().enumerate() {
             for c in 0..3 {
@@ -91,30 +76,11 @@ mod tests {
         let mut edges = Edges::of(&picture, 6);
         assert_eq!(edges.pixels, (0..30).filter(|at| [2, 3].contains(&(at % 6))).collect::<Vec<_>>());
         assert!(Edges::of(&[[7, 9, 9, 255]; 12], 4).pixels.is_empty());
-        for n in 0..PLACES {
+        for n in 0..SAMPLES {
             let seen = if n % 4 == 0 { [255; 4] } else { [0; 4] };
             edges.add(&vec![seen; edges.pixels.len()], &mut picture);
         }
         // A quarter of all places was white.
         assert!(picture[2][0] == 64 && picture[3][0] == 64 && picture[1][0] == 0 && picture[4][0] == 255);
-    }
-
-    #[test]
-    fn every_place_is_taken_once_within_its_pixel() {
-        let mut places: Vec<u8> = ORDER.into();
-        places.sort_unstable();
-        assert!(places.into_iter().eq(0..16));
-        let view = crate::Camera::viewed_from(glam::Vec3::ZERO, glam::Vec3::Y, 100.0).view(1.0);
-        let mut edges = Edges::default();
-        let size = [10, 10];
-        let mut middle = Vec2::ZERO;
-        for taken in 0..PLACES {
-            edges.taken = taken;
-            // Where the middle of the moved picture is in the picture, in pixels.
-            let at = view.project(view.eye + 50.0 * edges.next_view(&view, size).ray(Vec2::ZERO)).0 * 5.0;
-            assert!(at.abs().max_element() < 0.38, "{at}");
-            middle += at / PLACES as f32;
-        }
-        assert!(middle.length() < 1e-3, "{middle}");
     }
 }

@@ -1,12 +1,12 @@
 //! The view of one eye, with hits kept between pictures.
 
 use super::brain::Fragments;
-use super::edges::{Edges, PLACES};
+use super::edges::Edges;
 use super::skull::{Ray, TILE, cast, clear};
 use super::{Inputs, light, overlay, rows};
 use crate::border::Border;
 use crate::bricks::NOTHING;
-use crate::camera::View;
+use crate::camera::{SAMPLES, View};
 use crate::image::Image;
 use crate::overlay::Item;
 use crate::recast::Recast;
@@ -70,13 +70,14 @@ impl Eye {
 
     /// Whether all samples of the edges are taken.
     pub fn is_smooth(&self) -> bool {
-        self.edges.as_ref().is_some_and(|edges| edges.taken == PLACES || edges.pixels.is_empty())
+        self.edges.as_ref().is_some_and(|edges| edges.taken == SAMPLES || edges.pixels.is_empty())
     }
 
     /// The view of the next sample of the edges.
     pub fn next_view(&mut self, view: &View) -> View {
         let (pixels, width) = (&self.pixels, self.area[2] as usize);
-        self.edges.get_or_insert_with(|| Edges::of(pixels, width)).next_view(view, [self.area[2], self.area[3]])
+        let taken = self.edges.get_or_insert_with(|| Edges::of(pixels, width)).taken;
+        view.sample(taken, self.size())
     }
 
     /// Adds a sample of the edges, seen by their next view.

@@ -6,7 +6,7 @@ use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
 use super::quality::{Quality, Step};
-use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, banner, timeline};
+use super::{Draws, Lent, Panel, Playback, Refined, Session, Shared, Start, WindowInput, banner, timeline};
 use crate::{Frame, Image, RenderError, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
@@ -91,7 +91,8 @@ impl<S: Session, D: Draws> Window<S, D> {
         if shared.fault.is_some() {
             ui.send_viewport_cmd(egui::ViewportCommand::Close);
         }
-        let period = Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0));
+        let rate_hz = self.start.rate_hz.min(self.quality.most_hz());
+        let period = Duration::from_secs_f32(1.0 / rate_hz.clamp(1.0, 240.0));
         ui.request_repaint_after(period.saturating_sub(began.elapsed()));
     }
 
@@ -208,10 +209,14 @@ impl Screen {
     /// Smooths the edges of the last picture by one more sample; returns whether there was one to
     /// add.
     fn refine(&mut self, renderer: &mut impl Draws, frame: &Frame<'_>) -> bool {
-        let Self::Copies(Some(copy)) = self else { return false };
-        let Some(image) = renderer.refine(frame) else { return false };
-        copy.set(colours(&image), egui::TextureOptions::LINEAR);
-        true
+        // A lost device is met by the next picture.
+        match (renderer.refine(frame, matches!(self, Self::Copies(_))), self) {
+            (Ok(Refined::Copied(image)), Self::Copies(Some(copy))) => {
+                copy.set(colours(&image), egui::TextureOptions::LINEAR);
+                true
+            }
+            (refined, _) => matches!(refined, Ok(Refined::Drawn)),
+        }
     }
 
     /// Draws a frame and returns the window's texture of it.

@@ -36,6 +36,9 @@ const REST_S: f64 = 0.25;
 /// A numerical parameter: motion of tools, brain and arrows that is none to the eye, mm.
 const STILL_MM: f32 = 0.05;
 
+/// A numerical parameter: rate of the window at rest, Hz. Input wakes it at once.
+const AT_REST_HZ: f32 = 10.0;
+
 /// Nodes of the brain that are compared, at most.
 const NODES: usize = 512;
 
@@ -131,6 +134,12 @@ impl Quality {
     /// Fraction of the 3-D view's pixels along an edge while something moves.
     pub fn detail(&self) -> f32 {
         DETAILS[self.level]
+    }
+
+    /// Highest rate at which the window is worth a look, Hz: few while nothing moves, since showing
+    /// even the same picture costs a third of a core without a graphics card.
+    pub fn most_hz(&self) -> f32 {
+        if self.rest == Rest::Smooth { AT_REST_HZ } else { f32::INFINITY }
     }
 
     /// The picture rate and the sharpness, as text.
@@ -273,8 +282,10 @@ mod tests {
         assert_eq!(quality.step(&still, SIZE, false, 0.1), Step::Keep);
         assert_eq!(quality.step(&still, SIZE, false, 0.3), Step::Draw(1.0));
         assert_eq!(quality.step(&still, SIZE, false, 0.4), Step::Refine);
+        assert_eq!(quality.most_hz(), f32::INFINITY);
         quality.complete();
         assert_eq!(quality.step(&still, SIZE, false, 0.5), Step::Keep);
+        assert_eq!(quality.most_hz(), 10.0);
         let brain = [Vec3::splat(3.0); 9];
         let tool = Frame { tool: Some(Tool::burr(3.0)), ..still };
         let cut = Cut { point: Vec3::ZERO, normal: Vec3::X, bone: false };
