@@ -72,6 +72,8 @@ pub(crate) struct Quality {
     moved_at: f64,
     rest: Rest,
     last: f64,
+    /// Whether something moved in the last picture too.
+    paced: bool,
     /// Mean time between pictures while something moves, s.
     interval_s: f64,
 }
@@ -113,13 +115,14 @@ impl Quality {
     /// Processes a picture that took `drawing_s` to draw, at a time, s.
     pub fn note(&mut self, drawing_s: f64, now: f64) {
         let interval = now - std::mem::replace(&mut self.last, now);
-        // A pause or a sharp picture before says nothing of the pace.
-        if self.rest != Rest::Moving || self.moved_at != now {
-            (self.slow, self.fast) = (0, 0);
+        let moves = self.rest == Rest::Moving;
+        // A sharp picture before says nothing of the pace.
+        if !std::mem::replace(&mut self.paced, moves) || !moves || self.moved_at != now {
             return;
         }
         self.interval_s += (interval - self.interval_s) * if self.interval_s == 0.0 { 1.0 } else { 0.15 };
-        self.slow = if interval > SLOW_S { self.slow + 1 } else { 0 };
+        // Where drawing is short, others keep the window waiting: fewer pixels would not help.
+        self.slow = if interval > SLOW_S && drawing_s > FAST_S { self.slow + 1 } else { 0 };
         self.fast = if drawing_s < FAST_S && interval < SLOW_S { self.fast + 1 } else { 0 };
         let level = match () {
             () if self.slow >= PATIENCE_SLOW => {
@@ -261,6 +264,30 @@ mod tests {
         let starts = [(false, 1.0), (true, 1.0), (false, 0.5), (true, 0.25), (false, 0.1)]
             .map(|(s, d)| Quality::new(s, d).detail());
         assert_eq!(starts, [1.0, 0.4, 0.4, 0.22, 0.16]);
+    }
+
+    #[test]
+    fn waiting_for_others_makes_the_picture_no_coarser() {
+        let mut quality = Quality::new(false, 0.55);
+        for n in 0..50u32 {
+            let now = 0.2 * f64::from(n);
+            quality.step(&frame(n), SIZE, false, now);
+            quality.note(0.01, now);
+        }
+        assert_eq!((quality.detail(), quality.text()), (0.55, "5 pictures/s, 55 % sharp".into()));
+    }
+
+    #[test]
+    fn a_sharp_picture_between_changes_nothing() {
+        let mut quality = Quality::new(false, 0.55);
+        for n in 0..50u32 {
+            let now = f64::from(n);
+            quality.step(&frame(n), SIZE, false, now);
+            quality.note(0.03, now);
+            assert_eq!(quality.step(&frame(n), SIZE, false, now + 0.3), Step::Draw(1.0));
+            quality.note(0.5, now + 0.3);
+        }
+        assert_eq!(quality.detail(), 0.55);
     }
 
     #[test]

@@ -44,7 +44,9 @@ pub fn run(scope: Scope, findings: &mut Findings) {
         processor.resize(size.map(|n| (n as f32 * detail).round() as u32)).expect("the size is allowed");
         processor.set_casting(Casting { sparse: detail < 1.0, ..Casting::default() });
         processor.draw(&shown(0)).expect("drawn");
-        let times = Samples::of(scope.pick(3, 9), |turn| drop(processor.draw(&shown(turn + 1)).expect("drawn")));
+        let times = Samples::of(scope.pick(3, 9), |turn| {
+            processor.draw(&shown(turn + 1)).expect("drawn");
+        });
         let ms = 1e-3 * times.quantile(0.5);
         let row = Row::new(&scene, "processor, moving camera").with("detail", detail);
         let row = row.with("machine", format!("{} threads", processor.threads));
