@@ -14,7 +14,6 @@
 //! distances are recomputed, at about 0.1 µs a brick.
 
 use crate::drilled::{Drilled, LEAP};
-use crate::smooth;
 use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
@@ -24,6 +23,9 @@ pub(crate) const NOTHING: f32 = 1e30;
 
 /// Edge of a block whose bone fraction is stored for ambient light, in voxels.
 pub(crate) const BLOCK: usize = 4;
+
+/// A numerical parameter: largest distance between points of the smoothed CT, mm; at least a voxel.
+const SMOOTH_STEP_MM: f32 = 1.0;
 
 /// The padded grid of a bone volume.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +87,7 @@ impl Grid {
             spacing_mm: bone.spacing_mm(),
             isovalue: bone.isovalue(),
             steps: 2 * bone.cut_nodes() as usize,
-            smooth_step: smooth::step(bone.spacing_mm()),
+            smooth_step: ((SMOOTH_STEP_MM / bone.spacing_mm() + 1e-3) as usize).max(1),
         }
     }
 

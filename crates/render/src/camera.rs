@@ -35,7 +35,7 @@ pub struct View {
     pub forward: Vec3,
     /// Half the picture's width and height at distance 1.
     pub half: Vec2,
-    /// Offset of the picture's centre to the left and down at distance 1; nonzero for one eye of
+    /// Offset of the picture's centre to the left and down at distance 1. Nonzero for one eye of
     /// two, and within a pixel to smooth edges.
     pub shear: Vec2,
 }
@@ -45,8 +45,8 @@ const STEEPEST_RAD: f32 = 1.55;
 /// Samples of a pixel at rest.
 pub(crate) const SAMPLES: usize = 16;
 
-/// The 4 x 4 places of a pixel in the order in which they are taken: that of Bayer's matrix, so that
-/// any first few lie far apart.
+/// The 4 x 4 places of a pixel in the order in which they are taken. It is that of Bayer's matrix,
+/// so that any first few lie far apart.
 const ORDER: [u8; SAMPLES] = [0, 10, 2, 8, 5, 15, 7, 13, 1, 11, 3, 9, 4, 14, 6, 12];
 
 impl Camera {

@@ -21,21 +21,14 @@ use trepan_volume::{BRICK, BoneVolume};
 
 /// A numerical parameter: standard deviation of the Gaussian, mm; at least a voxel.
 const SIGMA_MM: f32 = 1.25;
-/// A numerical parameter: distance from the middle to the corners of the cube whose differences
-/// are the gradient, mm along each axis; at least half a voxel. `REACH_MM` in `skull.wgsl`.
+/// A numerical parameter: half the edge of the cube whose differences are the gradient, mm. At
+/// least half a voxel; `REACH_MM` in `skull.wgsl`.
 const REACH_MM: f32 = 0.5;
-/// A numerical parameter: largest distance between points of the lattice, mm.
-const STEP_MM: f32 = 1.0;
 /// A numerical parameter: density differences past this many HU from the isovalue do not bend a
 /// normal further; the same as in contact.
 const CLAMP_HU: f32 = 1000.0;
 /// Standard deviations after which the Gaussian is cut off.
 const TAILS: f32 = 2.5;
-
-/// Voxels from one point of the lattice to the next, for voxels of an edge, mm.
-pub(crate) fn step(spacing_mm: f32) -> usize {
-    ((STEP_MM / spacing_mm + 1e-3) as usize).max(1)
-}
 
 /// The smoothed CT.
 #[derive(Clone, Debug)]
@@ -126,8 +119,8 @@ impl Smooth {
         sums.into_iter().map(|sum| sum.round() as i16).collect()
     }
 
-    /// Smooths anew around those of the changed bricks of voxels whose CT changed; returns the boxes
-    /// of points that did, first and size.
+    /// Smooths anew around those of the changed bricks whose CT changed; returns the boxes of
+    /// points that did, first and size.
     pub fn follow(&mut self, bone: &BoneVolume, changed: &[[usize; 3]]) -> Vec<[[usize; 3]; 2]> {
         let [bx, by, _] = bone.bricks();
         let mut boxes = Vec::new();

@@ -163,9 +163,9 @@ impl Renderer {
         contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))
     }
 
-    /// Smooths the edges of the 3-D view by one more sample of every pixel; returns whether there was
-    /// one to add. `frame` must be the one that was drawn last. With stereo or less detail edges stay
-    /// as they are.
+    /// Smooths the edges of the 3-D view by one more sample of every pixel; returns whether there
+    /// was one to add. `frame` must be the one that was drawn last. With stereo or less detail
+    /// edges stay as they are.
     pub fn refine(&mut self, frame: &Frame) -> Result<bool, RenderError> {
         let Canvas { eyes, picture, mean, .. } = &mut self.canvas;
         let (passes, gpu) = (&self.passes, self.gpu.clone());

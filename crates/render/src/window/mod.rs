@@ -20,8 +20,8 @@
 //!
 //! The picture stays on the device: egui shows the renderer's own texture. Where that is impossible
 //! (a GL device, a device that cannot present on this display, or rendering on the processor) the
-//! window opens a second device and every picture is copied to it. While something moves, resolution
-//! follows the frame time; at rest the picture is sharp, and its edges are smoothed.
+//! window opens a second device and every picture is copied to it. While something moves,
+//! resolution follows the frame time; at rest the picture is sharp, and its edges are smoothed.
 //!
 //! # When not to use it
 //! Without a display: [`run`] returns an error and all arguments, so that the session can continue

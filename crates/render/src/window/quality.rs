@@ -139,8 +139,8 @@ impl Quality {
         DETAILS[self.level]
     }
 
-    /// Highest rate at which the window is worth a look, Hz: few while nothing moves, since showing
-    /// even the same picture costs a third of a core without a graphics card.
+    /// Highest rate of the window, Hz: low while nothing moves. Without a graphics card even the
+    /// same picture costs a third of a core at 30 Hz.
     pub fn most_hz(&self) -> f32 {
         if self.rest == Rest::Smooth { AT_REST_HZ } else { f32::INFINITY }
     }

@@ -42,8 +42,8 @@ pub(crate) struct Graphics {
 
 impl Graphics {
     /// Opens a painter for pictures of `size` pixels. The CPU painter replaces a software driver,
-    /// which takes six times as long for a picture: in a window, and headless where the models leave
-    /// out rays or pixels.
+    /// which takes six times as long for a picture: in a window, and headless where the models
+    /// leave out rays or pixels.
     pub fn open(
         setup: &SessionSetup,
         size: [u32; 2],

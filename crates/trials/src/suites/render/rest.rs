@@ -1,9 +1,9 @@
-//! Measures what the window draws without a graphics card: pictures a second while the camera
-//! moves, by the fraction of pixels, and how long edges take at rest and what they gain.
+//! Measures what the window draws without a graphics card, moving and at rest.
 //!
 //! # Practice
-//! 1280x800, the window's default, with slices, by the processor. The error is against 4 x 4
-//! samples in every pixel of the 3-D view.
+//! Pictures a second while the camera moves, by the fraction of pixels; how long edges take at rest
+//! and what they gain. 1280x800, the window's default, with slices, by the processor. The error is
+//! against 4 x 4 samples in every pixel of the 3-D view.
 
 use super::scenes::{SKULLS, brain, frame, skull, swaying};
 use crate::engine::suite::{Findings, Gate, Row};
