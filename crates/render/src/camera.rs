@@ -35,11 +35,19 @@ pub struct View {
     pub forward: Vec3,
     /// Half the picture's width and height at distance 1.
     pub half: Vec2,
-    /// Offset of the picture's centre to the left at distance 1; nonzero only for one eye of two.
-    pub shear: f32,
+    /// Offset of the picture's centre to the left and down at distance 1. Nonzero for one eye of
+    /// two, and within a pixel to smooth edges.
+    pub shear: Vec2,
 }
 
 const STEEPEST_RAD: f32 = 1.55;
+
+/// Samples of a pixel at rest.
+pub(crate) const SAMPLES: usize = 16;
+
+/// The 4 x 4 places of a pixel in the order in which they are taken. It is that of Bayer's matrix,
+/// so that any first few lie far apart.
+const ORDER: [u8; SAMPLES] = [0, 10, 2, 8, 5, 15, 7, 13, 1, 11, 3, 9, 4, 14, 6, 12];
 
 impl Camera {
     /// An eye at `distance_mm` from `target` in the direction `towards_eye` (any length; zero means
@@ -90,7 +98,7 @@ impl Camera {
             up: back.cross(right),
             forward: -back,
             half: Vec2::new(half * aspect, half),
-            shear: 0.0,
+            shear: Vec2::ZERO,
         }
     }
 }
@@ -104,12 +112,26 @@ impl View {
     /// The view from an eye `offset_mm` to the right, with zero parallax at `distance_mm`: an
     /// off-axis frustum without keystone distortion.
     pub fn from_aside(&self, offset_mm: f32, distance_mm: f32) -> Self {
-        Self { eye: self.eye + offset_mm * self.right, shear: offset_mm / distance_mm.max(Self::NEAR_MM), ..*self }
+        let shear = self.shear + Vec2::X * (offset_mm / distance_mm.max(Self::NEAR_MM));
+        Self { eye: self.eye + offset_mm * self.right, shear, ..*self }
+    }
+
+    /// The view of the `n`th sample of the pixels of a picture of `size` pixels, of [`SAMPLES`].
+    pub(crate) fn sample(&self, n: usize, size: [u32; 2]) -> Self {
+        let place = ORDER[n % SAMPLES];
+        self.moved(Vec2::new(f32::from(place % 4), f32::from(place / 4)) * 0.25 - 0.375, size)
+    }
+
+    /// The view whose pixels have their centres `by` pixels further right and down, in a picture of
+    /// `size` pixels.
+    fn moved(&self, by: Vec2, size: [u32; 2]) -> Self {
+        let pixel = 2.0 * self.half / Vec2::from(size.map(|n| n as f32));
+        Self { shear: self.shear + by * Vec2::new(-1.0, 1.0) * pixel, ..*self }
     }
 
     /// Direction of the picture's centre; length 1 along `forward`.
     pub(crate) fn middle(&self) -> Vec3 {
-        self.forward - self.shear * self.right
+        self.forward - self.shear.x * self.right - self.shear.y * self.up
     }
 
     /// Unit direction of the ray through a point of the picture, each coordinate from -1 (left,
@@ -122,8 +144,8 @@ impl View {
     pub fn project(&self, point: Vec3) -> (Vec2, f32) {
         let from = point - self.eye;
         let depth = from.dot(self.forward);
-        let across = from.dot(self.right) + self.shear * depth;
-        (Vec2::new(across, from.dot(self.up)) / (self.half * depth), depth)
+        let across = Vec2::new(from.dot(self.right), from.dot(self.up)) + self.shear * depth;
+        (across / (self.half * depth), depth)
     }
 
     /// The projection matrix for triangles.
@@ -131,7 +153,7 @@ impl View {
         let aspect = self.half.x / self.half.y;
         let clip_from_eye =
             glam::camera::rh::proj::directx::perspective(2.0 * self.half.y.atan(), aspect, Self::NEAR_MM, Self::FAR_MM);
-        let sheared = Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::Z, Vec4::new(self.shear / self.half.x, 0.0, 0.0, 1.0));
+        let sheared = Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::Z, (self.shear / self.half).extend(0.0).extend(1.0));
         sheared * clip_from_eye * glam::camera::rh::view::look_to_mat4(self.eye, self.forward, self.up)
     }
 }
@@ -168,12 +190,30 @@ mod tests {
         assert!(camera.view(1.5).project(point).0.x < at.x - 0.1);
     }
 
+    #[test]
+    fn every_sample_is_taken_once_within_its_pixel() {
+        let mut places: Vec<u8> = ORDER.into();
+        places.sort_unstable();
+        assert!(places.into_iter().eq(0..16));
+        let view = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 100.0).view(1.0);
+        let mut middle = Vec2::ZERO;
+        for n in 0..SAMPLES {
+            // Where the middle of the moved picture is in the picture, in pixels.
+            let at = view.project(view.eye + 50.0 * view.sample(n, [10, 10]).ray(Vec2::ZERO)).0 * 5.0;
+            assert!(at.abs().max_element() < 0.38, "{at}");
+            middle += at / SAMPLES as f32;
+        }
+        assert!(middle.length() < 1e-3, "{middle}");
+    }
+
     proptest! {
         #[test]
         fn matrix_projection_and_ray_agree(azimuth in -3.0f32..3.0, elevation in -1.5f32..1.5, aside in -9.0f32..9.0, x in -40.0f32..40.0, y in -40.0f32..40.0, z in -40.0f32..40.0) {
             let camera = Camera { target: Vec3::new(3.0, -8.0, 5.0), azimuth_rad: azimuth, elevation_rad: elevation, distance_mm: 200.0, fov_rad: 0.7 };
             let view = camera.view(1.4).from_aside(aside, camera.distance_mm);
             prop_assert!(view.project(camera.target).0.length() < 1e-4);
+            let view = view.moved(Vec2::new(0.4, -0.3), [14, 10]);
+            prop_assert!((view.project(camera.target).0 - Vec2::new(-0.8 / 14.0, -0.06)).length() < 1e-4);
             let point = Vec3::new(x, y, z);
             let (at, depth) = view.project(point);
             let clip = view.clip_from_world() * point.extend(1.0);

@@ -8,14 +8,14 @@ use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
 use super::pointer::Pointer;
-use super::quality::Quality;
+use super::quality::{Quality, Step};
 use super::surface::{Ray, Surfaces};
-use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, timeline};
-use crate::{Frame, RenderError, View};
+use super::{Draws, Lent, Panel, Playback, Refined, Session, Shared, Start, WindowInput, aids, banner, timeline};
+use crate::{Frame, Image, RenderError, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
 use glam::Vec3;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How the picture gets into the window.
 enum Screen {
@@ -53,6 +53,9 @@ pub(super) struct Window<S, D> {
     audio: super::loudspeaker::AudioOutput,
     screen: Screen,
     quality: Quality,
+    /// The last picture: its view and texture.
+    last: Option<(View, egui::TextureId)>,
+    /// Time of the last picture, s.
     pub(super) drawn_at: f64,
 }
 
@@ -77,13 +80,14 @@ impl<S: Session, D: Draws> Window<S, D> {
             audio: Default::default(),
             screen: if copies { Screen::Copies(None) } else { Screen::Shares(None) },
             quality: Quality::new(!hardware, start.detail),
+            last: None,
             drawn_at: 0.0,
         }
     }
 
     /// Draws one picture of the whole window.
     pub fn show(&mut self, ui: &mut egui::Ui, state: Option<&RenderState>) {
-        let lent = self.lent.clone();
+        let (lent, began) = (self.lent.clone(), Instant::now());
         let mut lent = lent.borrow_mut();
         let Some(shared) = lent.as_mut() else { return };
         self.captures.turn(ui.ctx(), &mut shared.session);
@@ -108,7 +112,9 @@ impl<S: Session, D: Draws> Window<S, D> {
         if shared.fault.is_some() {
             ui.send_viewport_cmd(egui::ViewportCommand::Close);
         }
-        ui.request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));
+        let rate_hz = self.start.rate_hz.min(self.quality.most_hz());
+        let period = Duration::from_secs_f32(1.0 / rate_hz.clamp(1.0, 240.0));
+        ui.request_repaint_after(period.saturating_sub(began.elapsed()));
     }
 
     /// Handles keys and clicks that concern the window itself.
@@ -204,18 +210,34 @@ impl<S: Session, D: Draws> Window<S, D> {
         let space = ui.available_size().max(egui::vec2(8.0, 8.0));
         let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
         let now = ui.input(|i| i.time);
-        self.quality.note(now - self.drawn_at);
         self.drawn_at = now;
         let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
-        let camera = self.hand.camera;
-        let frame = self.look.on(shared.session.frame(camera));
-        match self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, self.quality.detail()) {
+        let frame = self.look.on(shared.session.frame(self.hand.camera));
+        let stale = shared.renderer.is_stale();
+        let (step, began) = (self.quality.step(&frame, pixels, stale, now), Instant::now());
+        let shown = match (step, self.last) {
+            (Step::Keep, Some(last)) => Ok(last),
+            (Step::Refine, Some(last)) => {
+                if !self.screen.refine(&mut shared.renderer, &frame) {
+                    self.quality.complete();
+                }
+                Ok(last)
+            }
+            (Step::Draw(detail), _) => self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, detail),
+            _ => self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, 1.0),
+        };
+        self.quality.note(began.elapsed().as_secs_f64(), now);
+        match shown {
             Err(error) => shared.fault = Some(error.to_string()),
             Ok((view, id)) => {
+                self.last = Some((view, id));
                 let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
                 ui.painter().image(id, area, whole, egui::Color32::WHITE);
                 self.lead(ui, &response, &view, &shared.session);
+                let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
+                let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
+                ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, self.quality.text(), font, grey);
                 shared.shown = true;
             }
         }
@@ -263,6 +285,19 @@ enum ShowError {
 }
 
 impl Screen {
+    /// Smooths the edges of the last picture by one more sample; returns whether there was one to
+    /// add.
+    fn refine(&mut self, renderer: &mut impl Draws, frame: &Frame<'_>) -> bool {
+        // A lost device is met by the next picture.
+        match (renderer.refine(frame, matches!(self, Self::Copies(_))), self) {
+            (Ok(Refined::Copied(image)), Self::Copies(Some(copy))) => {
+                copy.set(colours(&image), egui::TextureOptions::LINEAR);
+                true
+            }
+            (refined, _) => matches!(refined, Ok(Refined::Drawn)),
+        }
+    }
+
     /// Draws a frame and returns the window's texture of it.
     fn show(
         &mut self,
@@ -277,12 +312,10 @@ impl Screen {
             Self::Shares(texture) => texture,
             Self::Copies(copy) => {
                 let (view, image) = renderer.picture(frame, pixels, detail)?;
-                let size = [image.width as usize, image.height as usize];
-                let image = egui::ColorImage::from_rgba_unmultiplied(size, &image.rgba);
                 let linear = egui::TextureOptions::LINEAR;
                 let copy =
                     copy.get_or_insert_with(|| ui.ctx().load_texture("picture", egui::ColorImage::default(), linear));
-                copy.set(image, linear);
+                copy.set(colours(&image), linear);
                 return Ok((view, copy.id()));
             }
         };
@@ -295,6 +328,12 @@ impl Screen {
         *self = Self::Copies(None);
         self.show(ui, Some(state), renderer, frame, pixels, detail)
     }
+}
+
+/// A picture as egui takes it.
+fn colours(image: &Image) -> egui::ColorImage {
+    // It is opaque, so that nothing is to be multiplied.
+    egui::ColorImage::from_rgba_premultiplied([image.width as usize, image.height as usize], &image.rgba)
 }
 
 /// Registers the renderer's texture, again when it changed.

@@ -25,8 +25,8 @@
 //!
 //! The picture stays on the device: egui shows the renderer's own texture. Where that is impossible
 //! (a GL device, a device that cannot present on this display, or rendering on the processor) the
-//! window opens a second device and every picture is copied to it. Resolution is lowered when
-//! pictures take longer than a tenth of a second, and raised again when there is time.
+//! window opens a second device and every picture is copied to it. While something moves,
+//! resolution follows the frame time; at rest the picture is sharp, and its edges are smoothed.
 //!
 //! # When not to use it
 //! Without a display: [`run`] returns an error and all arguments, so that the session can continue
@@ -59,7 +59,7 @@ mod timeline;
 mod tool_icon;
 
 pub use capture::Capture;
-pub use draws::Draws;
+pub use draws::{Draws, Refined};
 pub use input::WindowInput;
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};

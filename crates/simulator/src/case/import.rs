@@ -195,7 +195,7 @@ fn sight(
     let classes = images.mask.as_ref().map(cropped).transpose()?;
     let inside = classes.as_ref().map(Inside::of);
     let of_bone = |ct: &VoxelVolume<i16>| {
-        let drawn = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
+        let (drawn, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
         let bone = bone_of(&drawn, images.isovalue_hu)?;
         let opening = Opening::of_patient(&bone, inside.as_ref(), recipe.opening)?;
         let mut skull = Skull { ct: ct.clone(), isovalue: images.isovalue_hu };
@@ -307,7 +307,9 @@ fn build(
 ) -> Result<Case, SessionError> {
     let Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull");
-    let skull = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
+    let made = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
+    notes.extend(made.as_ref().and_then(|(_, islands)| islands.note()));
+    let skull = made.map(|(skull, _)| skull);
     stages.next("planning the opening");
     let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
     let on_skull = |(ct, skull)| match known {
