@@ -139,7 +139,7 @@ impl Bench {
     }
 
     fn closes(&self) -> bool {
-        self.commands().contains(&ViewportCommand::Close)
+        self.window.state().is_over()
     }
 }
 

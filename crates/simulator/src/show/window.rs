@@ -1,4 +1,4 @@
-//! The main thread of a session with a window: renders the newest state and passes on user input.
+//! A session in the window: renders the newest state and passes on user input.
 //!
 //! # Practice
 //! Window and loops never wait for each other. With the mouse as device, the haptic loop reads the
@@ -20,7 +20,7 @@ use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_link::wire::TeacherRecord;
-use trepan_render::window::{self, Action, Capture, Leash, Panel, Start, WindowInput};
+use trepan_render::window::{self, Action, Capture, Leash, Panel, Stage, Start, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter};
 
 /// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
@@ -31,6 +31,8 @@ const REQUEST_S: f64 = 0.1;
 
 /// Session data for the window.
 pub(crate) struct Opened<'a> {
+    /// The window.
+    pub stage: &'a Stage,
     /// Patient, plan and program.
     pub table: &'a SessionSetup,
     /// Name of the case, without the patient's name.
@@ -39,6 +41,8 @@ pub(crate) struct Opened<'a> {
     pub out: &'a Path,
     /// Requested rate of the haptic loop, Hz.
     pub rate_hz: f32,
+    /// Place in the tray of the tool that a hand with the mouse begins with.
+    pub slot: usize,
 }
 
 /// What a live session and a replay show alike.
@@ -115,6 +119,16 @@ struct Show {
 struct Requests(Vec<(Buttons, f64)>);
 
 impl Requests {
+    /// Requests the first tool; the one in the hand already needs no request.
+    fn first(slot: usize) -> Self {
+        Self((slot > 0).then(|| (Buttons::slot(slot), f64::INFINITY)).into_iter().collect())
+    }
+
+    /// Drops the request of the first tool once it is in the hand.
+    fn settle(&mut self, slot: usize) {
+        self.0.retain(|(button, until)| until.is_finite() || *button != Buttons::slot(slot));
+    }
+
     /// Adds new requests and returns all that are active at a time, s.
     fn at(&mut self, seconds: f64, new: impl Iterator<Item = Buttons>) -> Buttons {
         self.0.retain(|(_, until)| seconds < *until);
@@ -160,7 +174,7 @@ pub(crate) fn show(
         company,
         markers: Vec::new(),
         ghost: None,
-        requests: Requests::default(),
+        requests: Requests::first(opened.slot),
         rate: Rate::default(),
     };
     let (show, album) = run(show, painter, opened, view);
@@ -168,7 +182,7 @@ pub(crate) fn show(
 }
 
 /// Runs a session in a window, with a picture before and one after it.
-pub(crate) fn run<S: window::Session + 'static>(
+pub(crate) fn run<S: window::Session + Send>(
     session: S,
     mut painter: Painter,
     opened: &Opened<'_>,
@@ -181,7 +195,7 @@ pub(crate) fn run<S: window::Session + 'static>(
     let detail = opened.table.models.setup.picture.detail as f32;
     let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
     let counted = Counted { session, pictures: 0, seconds: [0.0; 2] };
-    let closed = window::run(&format!("Trepan {}", opened.table.program.name()), painter, counted, start);
+    let closed = opened.stage.run(painter, counted, start);
     let (mut painter, Counted { session, pictures, seconds: [from, to] }) = (closed.renderer, closed.session);
     (album.frames, album.seconds) = (album.frames + pictures, to - from);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
@@ -229,6 +243,7 @@ impl window::Session for Show {
         if let Some(soft) = &mut self.inputs.soft {
             self.positions.clone_from(&soft.latest().0.positions);
         }
+        self.requests.settle(self.view.sample.slot);
         self.send_pose(input);
         let lesson = self.exchange_requests(input);
         let view = &self.view;
