@@ -50,6 +50,7 @@ mod show;
 mod solver;
 mod stages;
 mod tissue_class;
+mod training;
 mod uncertainty;
 
 pub use case::Inputs;

@@ -69,6 +69,10 @@ pub struct Options {
     /// Who operates; the report compares with earlier sessions of the same person
     #[arg(long, value_name = "NAME")]
     pub person: Option<String>,
+    /// Lesson with steps and pass marks: first-operation, through or flap, or the name in a file of
+    /// the user's own
+    #[arg(long, value_name = "NAME", conflicts_with = "watch")]
+    pub lesson: Option<String>,
     /// Folder of the sessions that the start page begins
     #[arg(skip)]
     pub sessions: Option<PathBuf>,
@@ -397,7 +401,7 @@ impl Options {
     pub(crate) fn names_no_session(&self) -> bool {
         let Patient { ct, mri, labels, tissues, .. } = &self.patient;
         let paths = [&self.case, ct, mri, labels, &self.out, &self.record];
-        let names = [&self.device, &self.second_device, &self.share, &self.watch, &self.name];
+        let names = [&self.device, &self.second_device, &self.share, &self.watch, &self.name, &self.lesson];
         let none = paths.iter().all(|path| path.is_none()) && names.iter().all(|name| name.is_none());
         none && tissues.is_empty() && self.duration.is_none()
     }

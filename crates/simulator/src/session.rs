@@ -13,6 +13,8 @@ use crate::options::Options;
 use crate::program::Program;
 use crate::progress::Progress;
 use crate::recordings;
+use crate::report::debrief::Debrief;
+use crate::report::kept::Kept;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{CutOff, Machine, SecondSummary, SolverSummary, Summary, fps};
@@ -30,6 +32,7 @@ use crate::show::graphics::{Graphics, NoPicture};
 use crate::show::picture::{self, Album};
 use crate::show::{player, window};
 use crate::stages::haptic_tick::ToolSample;
+use crate::training::{Guide, Lesson};
 use std::path::{Path, PathBuf};
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
@@ -53,6 +56,7 @@ pub struct Session {
     /// Input files of the case; empty for a case folder.
     inputs: Inputs,
     out: PathBuf,
+    lesson: Option<Lesson>,
     /// Where it runs.
     place: Place,
 }
@@ -99,6 +103,7 @@ impl Session {
         mut place: Place,
     ) -> Result<Self, SessionError> {
         options.check()?;
+        let (lesson, options) = taught(options)?;
         let windowed = place.window.is_some();
         check_outputs(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
@@ -122,7 +127,7 @@ impl Session {
         let out = options.out.clone().unwrap_or_else(|| {
             output::dated(program, options.sessions.as_deref(), options.name.as_deref())
         });
-        Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, place })
+        Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, lesson, place })
     }
 
     /// Runs the session and writes its files; on failure no partly written file remains.
@@ -186,12 +191,21 @@ impl Session {
             ..self.about(&album)
         };
         let summary = summary.with(&outcome);
-        output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
+        let debrief = self.debrief(&summary)?;
+        output::write(&self.out, &recording, &summary, &outcome, (&debrief, &self.shots(album.shots)))?;
         if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
             output::skull(&self.out, &densities, around.as_ref(), bone, self.options.stl)?;
         }
         files.keep();
         Ok(Ended { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
+    }
+
+    /// The debriefing, compared with earlier sessions beside this one.
+    fn debrief(&self, summary: &Summary) -> Result<Debrief, SessionError> {
+        let summary = serde_json::to_value(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
+        let roots: Vec<PathBuf> = self.out.ancestors().nth(2).map(PathBuf::from).into_iter().collect();
+        let this = Kept::with(&self.out, summary);
+        Ok(Debrief::of(&this.summary, self.lesson.as_ref(), &this.before(&Kept::list(&roots))))
     }
 
     fn windowed(&self) -> bool {
@@ -325,7 +339,7 @@ impl Session {
             return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
         };
         let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
-        let opened = window::Opened { stage, table, case, out, rate_hz, slot: self.options.first_slot };
+        let opened = window::Opened { stage, table, case, out, rate_hz, slot: self.options.first_slot, guide: self.lesson.clone().map(Guide::new) };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
                 let until_s = self.options.duration.unwrap_or(f64::INFINITY);
@@ -387,6 +401,7 @@ impl Session {
             case: self.case.name.clone(),
             person: self.options.person.clone(),
             name: self.options.name.clone(),
+            lesson: self.lesson.as_ref().map(|lesson| lesson.name.clone()),
             device: match (self.device.recording(), &self.options.watch) {
                 (_, Some(_)) => "watch".into(),
                 (Some(_), _) => "replay".into(),
@@ -410,6 +425,17 @@ impl Session {
             ..Summary::default()
         }
     }
+}
+
+/// Finds the lesson that the options name, and takes its flap and tool.
+fn taught(options: Options) -> Result<(Option<Lesson>, Options), SessionError> {
+    let Some(name) = &options.lesson else { return Ok((None, options)) };
+    let all = Lesson::all(Lesson::folder().as_deref());
+    let names = || all.iter().map(|lesson| lesson.name.as_str()).collect::<Vec<_>>().join(", ");
+    let unknown = || SessionError::Usage(format!("--lesson {name} is not known: give one of {}", names()));
+    let lesson = all.iter().find(|lesson| lesson.name == *name).cloned().ok_or_else(unknown)?;
+    let flap = options.flap.or(Some(lesson.flap_mm));
+    Ok((Some(lesson.clone()), Options { flap, first_slot: lesson.slot, ..options }))
 }
 
 /// Device of a hand, if any.

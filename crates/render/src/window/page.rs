@@ -63,8 +63,8 @@ pub enum Item<A> {
     Picture(Picture<A>),
     /// Rows of equal length; the first is the heading.
     Table(Vec<Vec<String>>),
-    /// An area that scrolls by itself, at most so many points high.
-    List(f32, Vec<Item<A>>),
+    /// Values in their order, as a curve with its title.
+    Curve(String, Vec<f64>),
 }
 
 /// A button on a page.
@@ -241,12 +241,7 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         }
         Item::Picture(picture) => look(ui, picture, textures, done),
         Item::Table(rows) => table(ui, rows),
-        Item::List(height, items) => {
-            let area = egui::ScrollArea::vertical().id_salt(items.len()).max_height(*height);
-            area.auto_shrink([false, true]).show(ui, |ui| {
-                items.iter().for_each(|item| draw(ui, item, textures, done));
-            });
-        }
+        Item::Curve(title, values) => curve(ui, title, values),
     }
 }
 
@@ -323,6 +318,17 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, textures: &mut Textures, don
     if let Some(does) = picture.dragged.filter(|_| response.dragged()) {
         done.push(does(share(response.drag_delta())));
     }
+}
+
+fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
+    ui.add_space(8.0);
+    ui.label(RichText::new(title).strong());
+    let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(at, value)| [at as f64 + 1.0, *value]).collect();
+    let still = egui_plot::Plot::new(title).height(120.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
+    still.show(ui, |plot| {
+        plot.line(egui_plot::Line::new(title, points.clone()).color(SKY).width(2.0));
+        plot.points(egui_plot::Points::new(title, points).color(SKY).radius(4.0));
+    });
 }
 
 fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {

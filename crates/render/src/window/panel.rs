@@ -91,7 +91,7 @@ fn plots(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
 }
 
 fn values(ui: &mut egui::Ui, panel: &Panel) {
-    egui::Grid::new("values").num_columns(2).striped(true).show(ui, |ui| {
+    egui::Grid::new("values").num_columns(2).striped(true).max_col_width(122.0).show(ui, |ui| {
         for (name, value) in &panel.values {
             ui.label(name);
             ui.label(RichText::new(value).monospace());

@@ -10,6 +10,10 @@ pub(crate) enum Action {
     Home,
     /// Shows the sessions that were kept.
     Sessions,
+    /// Shows the lessons.
+    Lessons,
+    /// Begins a lesson.
+    Lesson(usize),
     /// Chooses the built-in case.
     BuiltIn,
     /// Chooses a recent case.

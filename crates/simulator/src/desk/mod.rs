@@ -10,7 +10,6 @@ mod browse;
 mod draft;
 mod form;
 mod job;
-mod kept;
 mod pages;
 mod results;
 mod settings;

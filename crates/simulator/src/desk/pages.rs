@@ -21,7 +21,7 @@ pub(crate) fn start(program: Program, form: &Form) -> Page<Action> {
     Page {
         title: "Trepan".into(),
         line: format!("{}: choose a case and start", what(program)),
-        columns: vec![case(form), session(program, form), more()],
+        columns: vec![case(form), session(program, form), more(program)],
         foot: [begin, chosen].into_iter().chain(lacks).collect(),
         escape: None,
     }
@@ -129,8 +129,15 @@ fn session(program: Program, form: &Form) -> Vec<Item<Action>> {
     items
 }
 
-fn more() -> Vec<Item<Action>> {
+fn more(program: Program) -> Vec<Item<Action>> {
+    let first = match program.has_bone() {
+        true => Item::button("Guided first operation", "step by step, about two minutes", Action::Lesson(0)),
+        false => Item::closed("Guided first operation", "it drills: use integrated or craniotomy"),
+    };
     vec![
+        Item::Heading("Learn".into()),
+        first,
+        Item::button("Lessons...", "steps, targets and pass marks", Action::Lessons),
         Item::Heading("Look back".into()),
         Item::button("Sessions...", "results, reports and replays of all sessions", Action::Sessions),
         Item::button("Replay a recording...", Goal::Recording.line(), Action::Browse(Goal::Recording)),

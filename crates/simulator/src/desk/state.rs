@@ -8,7 +8,6 @@ use crate::desk::browse::{Folder, Goal};
 use crate::desk::draft;
 use crate::desk::form::Form;
 use crate::desk::job::{Done, Job, Work};
-use crate::desk::kept::Kept;
 use crate::desk::pages;
 use crate::desk::results;
 use crate::desk::settings::{Recent, Source, sessions};
@@ -16,8 +15,10 @@ use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
 use crate::progress::Progress;
+use crate::report::kept::Kept;
 use crate::run::stop::Stop;
 use crate::session::{Place, Session};
+use crate::training::Lesson;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -139,7 +140,7 @@ impl Desk {
             Ok(Done::Session(ended)) => {
                 self.form.case.hash = ended.case.clone().unwrap_or_default();
                 self.form.settings.remember(self.form.case.clone());
-                View::Page(Box::new(results::page(&ended.out, &self.kept())))
+                View::Page(Box::new(results::page(&ended.out, &self.kept(), &lessons())))
             }
         };
         self.keep();
@@ -196,6 +197,10 @@ impl Desk {
         self.form.case = self.form.settings.recent.iter().find(is).cloned().unwrap_or_else(built_in);
         self.begin(self.form.replay(&self.base, self.program, recording));
     }
+}
+
+fn lessons() -> Vec<Lesson> {
+    Lesson::all(Lesson::folder().as_deref())
 }
 
 /// The work of one session.
@@ -315,8 +320,18 @@ impl Desk {
                     self.view = View::Start;
                 }
             }
+            Action::Lessons => {
+                let (closed, person) = (self.form.lacks(self.program), &self.form.settings.person);
+                self.view = View::Page(Box::new(results::lessons(&lessons(), &self.kept(), person, closed)));
+            }
+            Action::Lesson(at) => {
+                let options = self.form.options(&self.base, self.program);
+                let lesson = lessons().get(at).map(|lesson| lesson.name.clone());
+                // The lesson brings its own flap.
+                self.begin(options.map(|options| Options { lesson, flap: self.base.flap, ..options }));
+            }
             Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept()))),
-            Action::Result(folder) => self.view = View::Page(Box::new(results::page(&folder, &self.kept()))),
+            Action::Result(folder) => self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons()))),
             Action::Report(folder) => open(&folder.join("report.html")),
             Action::Replay(folder) => self.replay(&folder.join("session.mcap")),
             Action::Close => self.view = View::Closed,

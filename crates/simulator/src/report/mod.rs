@@ -2,6 +2,8 @@
 
 pub(crate) mod chart;
 pub(crate) mod drilled;
+pub(crate) mod debrief;
+pub(crate) mod kept;
 pub(crate) mod output;
 pub(crate) mod page;
 pub(crate) mod plan_comparison;

@@ -2,6 +2,7 @@
 
 use crate::error::SessionError;
 use crate::program::Program;
+use crate::report::debrief::Debrief;
 use crate::report::drilled;
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
@@ -148,13 +149,13 @@ pub(crate) fn write(
     recording: &Recording,
     summary: &Summary,
     outcome: &Outcome,
-    shots: &[Shot],
+    (debrief, shots): (&Debrief, &[Shot]),
 ) -> Result<(), SessionError> {
     let json =
         serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
     whole(&out.join("scores.csv"), scores(summary).as_bytes())?;
-    let page = page::html(summary, outcome, recording, shots)?;
+    let page = page::html(summary, outcome, recording, (debrief, shots))?;
     whole(&out.join("report.html"), page.as_bytes())
 }
 

@@ -23,6 +23,8 @@ pub struct Summary {
     pub case: String,
     /// Who operated; `null` if that was not said.
     pub person: Option<String>,
+    /// Name of the lesson; `null` without one.
+    pub lesson: Option<String>,
     /// Name of the session; `null` without one.
     pub name: Option<String>,
     /// Name of the device.

@@ -16,6 +16,7 @@ use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
 use crate::show::picture::{Album, camera, frame, microscope, snap};
+use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
@@ -43,6 +44,8 @@ pub(crate) struct Opened<'a> {
     pub rate_hz: f32,
     /// Place in the tray of the tool that a hand with the mouse begins with.
     pub slot: usize,
+    /// The lesson, if there is one.
+    pub guide: Option<Guide>,
 }
 
 /// What a live session and a replay show alike.
@@ -112,6 +115,7 @@ struct Show {
     ghost: Option<Pose>,
     requests: Requests,
     rate: Rate,
+    guide: Option<Guide>,
 }
 
 /// Recent requests, each with the time at which it expires, s.
@@ -176,6 +180,7 @@ pub(crate) fn show(
         ghost: None,
         requests: Requests::first(opened.slot),
         rate: Rate::default(),
+        guide: opened.guide.clone(),
     };
     let (show, album) = run(show, painter, opened, view);
     show.shown.finish(album)
@@ -248,6 +253,9 @@ impl window::Session for Show {
         let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
+        let step = self.guide.as_mut().map(|guide| guide.follow(view));
+        let usual = || if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into();
+        let hint = step.unwrap_or_else(usual);
         let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
         let mut panel = self.shown.panel(view, by_hand);
         panel.warnings.extend(lesson.warnings);
@@ -262,7 +270,7 @@ impl window::Session for Show {
             panel.news = vec![format!("{text}: close the window (Q)")];
         }
         Panel {
-            hint: if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into(),
+            hint,
             by_hand,
             rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
             wanted_rate_hz: self.wanted_rate_hz,
@@ -401,6 +409,7 @@ mod tests {
             ghost: None,
             requests: Requests::default(),
             rate: Rate::default(),
+            guide: None,
         };
         let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());
