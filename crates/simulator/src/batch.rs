@@ -40,13 +40,7 @@ pub(crate) fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, Sess
 }
 
 /// Replays recordings one after the other; returns the number of failures.
-pub(crate) fn run(
-    program: Program,
-    options: &Options,
-    built_in: &Inputs,
-    files: &[PathBuf],
-    place: &Place,
-) -> usize {
+pub(crate) fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf], place: &Place) -> usize {
     let out = options.out.clone().unwrap_or_else(|| dated(program, None, options.name.as_deref()));
     let failed = |file: &&PathBuf| match one(program, options, built_in, file, (&out, place)) {
         Ok(line) => {

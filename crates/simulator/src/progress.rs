@@ -84,6 +84,9 @@ mod tests {
         assert!(matches!(progress.next("meshing the brain"), Err(SessionError::Cancelled)));
         progress.run();
         assert!(other.is_running());
-        assert_eq!(other.so_far().0.iter().map(|s| s.0).collect::<Vec<_>>(), ["reading the CT", "meshing the brain", RUNNING]);
+        assert_eq!(
+            other.so_far().0.iter().map(|s| s.0).collect::<Vec<_>>(),
+            ["reading the CT", "meshing the brain", RUNNING]
+        );
     }
 }

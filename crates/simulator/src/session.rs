@@ -124,9 +124,10 @@ impl Session {
         progress.next("preparing the operation")?;
         let identity = Identity { name: case.name.clone(), case: Some(case.hash.clone()), images: case.images.clone() };
         let setup = SessionSetup::new(program, (case, models), operation, windowed && recording.is_some())?;
-        let out = options.out.clone().unwrap_or_else(|| {
-            output::dated(program, options.sessions.as_deref(), options.name.as_deref())
-        });
+        let out = options
+            .out
+            .clone()
+            .unwrap_or_else(|| output::dated(program, options.sessions.as_deref(), options.name.as_deref()));
         Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, lesson, place })
     }
 
@@ -202,7 +203,8 @@ impl Session {
 
     /// The debriefing, compared with earlier sessions beside this one.
     fn debrief(&self, summary: &Summary) -> Result<Debrief, SessionError> {
-        let summary = serde_json::to_value(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
+        let summary =
+            serde_json::to_value(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
         let roots: Vec<PathBuf> = self.out.ancestors().nth(2).map(PathBuf::from).into_iter().collect();
         let this = Kept::with(&self.out, summary);
         Ok(Debrief::of(&this.summary, self.lesson.as_ref(), &this.before(&Kept::list(&roots))))
@@ -339,7 +341,15 @@ impl Session {
             return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
         };
         let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
-        let opened = window::Opened { stage, table, case, out, rate_hz, slot: self.options.first_slot, guide: self.lesson.clone().map(Guide::new) };
+        let opened = window::Opened {
+            stage,
+            table,
+            case,
+            out,
+            rate_hz,
+            slot: self.options.first_slot,
+            guide: self.lesson.clone().map(Guide::new),
+        };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
                 let until_s = self.options.duration.unwrap_or(f64::INFINITY);

@@ -101,8 +101,13 @@ impl Lesson {
     /// Lists the lessons of the program and those in a folder; files that are none are logged.
     pub fn all(folder: Option<&Path>) -> Vec<Self> {
         let own = OWN.iter().filter_map(|text| serde_json::from_str(text).ok());
-        let mut files: Vec<_> =
-            folder.and_then(|folder| fs::read_dir(folder).ok()).into_iter().flatten().flatten().map(|e| e.path()).collect();
+        let mut files: Vec<_> = folder
+            .and_then(|folder| fs::read_dir(folder).ok())
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|e| e.path())
+            .collect();
         files.sort();
         let read = |file: &PathBuf| {
             let read = fs::read(file).map_err(|fault| fault.to_string());
@@ -142,8 +147,10 @@ impl Mark {
 
     /// The limit in words: "at most 1 mm".
     pub fn limit(&self) -> String {
-        let bound = |word: &str, value: Option<f64>| value.map(|value| format!("{word} {value} {}", self.unit).trim().into());
-        let bounds: Vec<String> = [bound("at least", self.least), bound("at most", self.most)].into_iter().flatten().collect();
+        let bound =
+            |word: &str, value: Option<f64>| value.map(|value| format!("{word} {value} {}", self.unit).trim().into());
+        let bounds: Vec<String> =
+            [bound("at least", self.least), bound("at most", self.most)].into_iter().flatten().collect();
         bounds.join(", ")
     }
 }
@@ -190,7 +197,9 @@ mod tests {
         assert_eq!(lessons.len(), OWN.len());
         for lesson in &lessons {
             assert_eq!(lesson.steps.last().map(|step| step.until), Some(Measure::Never), "{}", lesson.name);
-            assert!(lesson.slot < 4 && !lesson.marks.is_empty() && lesson.marks.iter().all(|mark| !mark.limit().is_empty()));
+            assert!(
+                lesson.slot < 4 && !lesson.marks.is_empty() && lesson.marks.iter().all(|mark| !mark.limit().is_empty())
+            );
         }
     }
 
@@ -210,7 +219,8 @@ mod tests {
 
     #[test]
     fn a_mark_is_read_by_its_path_and_a_missing_value_does_not_pass() {
-        let mark = Mark { text: "t".into(), path: "plan.dice".into(), unit: "mm".into(), least: Some(0.5), most: Some(2.0) };
+        let mark =
+            Mark { text: "t".into(), path: "plan.dice".into(), unit: "mm".into(), least: Some(0.5), most: Some(2.0) };
         let value = mark.value(&serde_json::json!({ "plan": { "dice": 0.7 } }));
         assert!(mark.passes(value) && !mark.passes(Some(3.0)) && !mark.passes(mark.value(&Value::Null)));
         assert_eq!(mark.limit(), "at least 0.5 mm, at most 2 mm");

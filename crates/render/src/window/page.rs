@@ -45,6 +45,8 @@ pub enum Item<A> {
     Note(String),
     /// A verdict: passed or not, in words and colour.
     Verdict(bool, String),
+    /// A text with a patch of a colour.
+    Label(String, [u8; 3]),
     /// A remark that must be seen.
     Alert(String),
     /// A button.
@@ -217,6 +219,10 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         Item::Verdict(passed, text) => {
             let (word, colour) = if *passed { ("passed", GREEN) } else { ("not passed", ORANGE) };
             ui.label(RichText::new(format!("{word}: {text}")).size(15.0).strong().color(colour));
+        }
+        Item::Label(text, [r, g, b]) => {
+            ui.label(RichText::new("■").color(Color32::from_rgb(*r, *g, *b)));
+            ui.label(text);
         }
         Item::Alert(text) => {
             egui::Frame::new().fill(VERMILION).inner_margin(10.0).show(ui, |ui| {

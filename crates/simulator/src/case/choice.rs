@@ -47,6 +47,28 @@ pub(crate) fn open_case(
     Ok((case, models.ok_or_else(unsettled)?))
 }
 
+/// Opens a case to look at, without the models of a session: the named folder, the cached case of
+/// this hash, else the images in voxels and tetrahedra of preset `usual`.
+pub(crate) fn case_to_check(
+    program: Program,
+    options: &Options,
+    built_in: Inputs,
+    hash: &str,
+    progress: &Progress,
+) -> Result<Case, SessionError> {
+    progress.next("looking at the images")?;
+    if let Some(folder) = &options.case {
+        return folder::load(folder);
+    }
+    let cache = Cache::of(&options.patient)?;
+    let known = Some(hash).filter(|hash| !hash.is_empty()).and_then(|hash| cache.find(hash));
+    if let Some(Ok(case)) = known.map(|folder| folder::load(&folder)) {
+        return Ok(case);
+    }
+    let recipe = recipe(&options.patient);
+    import::open_by(program, (&inputs(&options.patient, built_in), &recipe), &cache, progress, |_| Ok(recipe))
+}
+
 /// Refuses a class of `--forbid` that the case does not contain.
 fn check_forbidden(options: &Options, has_class: impl Fn(TissueClass) -> bool) -> Result<(), SessionError> {
     match options.forbid.iter().flatten().find(|class| !has_class(**class)) {

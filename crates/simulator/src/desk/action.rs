@@ -46,6 +46,16 @@ pub(crate) enum Action {
     Quality(usize),
     /// Sets the flap's diameter, mm.
     Flap(f32),
+    /// Shows the chosen case in pictures.
+    Check,
+    /// Chooses the opening by a click on the head, a share of the picture.
+    OpenAt([f32; 2]),
+    /// Turns the head, by a share of the picture.
+    Turn([f32; 2]),
+    /// Sets the share of the MRI in the slices.
+    Blend(f32),
+    /// Moves the slices along an axis to a place, mm.
+    Slide(usize, f32),
     /// Begins the chosen session.
     Begin,
     /// Ends loading.

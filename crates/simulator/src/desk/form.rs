@@ -44,7 +44,8 @@ impl Form {
             let script = if name.is_empty() { program.script() } else { name };
             (format!("script:{script}"), choosable(&format!("demonstration: {script}"), hint, true))
         });
-        let is_real = |device: &&Listed| !["mouse", "script", "simulated", "replay"].iter().any(|k| device.name.starts_with(k));
+        let is_real =
+            |device: &&Listed| !["mouse", "script", "simulated", "replay"].iter().any(|k| device.name.starts_with(k));
         let real = self.devices.iter().filter(is_real).map(|device| {
             (device.name.clone(), choosable(&device.name, &device.state, device.state.starts_with("ready")))
         });
@@ -73,7 +74,8 @@ impl Form {
             "for most machines",
             "for fast machines",
         ];
-        let of = |(quality, hint): (Quality, &str)| Choosable { name: quality.name().into(), hint: hint.into(), open: true };
+        let of =
+            |(quality, hint): (Quality, &str)| Choosable { name: quality.name().into(), hint: hint.into(), open: true };
         Quality::ALL.into_iter().zip(hints).map(of).collect()
     }
 
@@ -99,7 +101,8 @@ impl Form {
         match &self.case.source {
             Source::BuiltIn => {}
             Source::Images { ct, mri, register } => {
-                (options.patient.ct, options.patient.mri, options.patient.register) = (ct.clone(), mri.clone(), *register);
+                (options.patient.ct, options.patient.mri, options.patient.register) =
+                    (ct.clone(), mri.clone(), *register);
             }
             Source::Folder(folder) => options.case = Some(folder.clone()),
         }
@@ -143,7 +146,10 @@ mod tests {
         form.case.source = Source::Images { ct: Some("ct".into()), mri: None, register: true };
         assert!(form.lacks(Program::Integrated).is_some() && form.lacks(Program::Craniotomy).is_none());
         let given = form.options(&base, Program::Integrated).unwrap();
-        assert_eq!((given.device.as_deref(), given.flap, given.patient.register), (Some("script:flap"), Some(30.0), true));
+        assert_eq!(
+            (given.device.as_deref(), given.flap, given.patient.register),
+            (Some("script:flap"), Some(30.0), true)
+        );
         form.case = Recent { source: Source::Folder("c".into()), opening: Some([0.0; 3]), ..Recent::default() };
         let folder = form.options(&base, Program::Integrated).unwrap();
         assert_eq!((folder.case, folder.patient.opening), (Some("c".into()), None));

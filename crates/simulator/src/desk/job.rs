@@ -1,5 +1,6 @@
 //! A session on its own thread: it loads, runs in the window and writes its files.
 
+use crate::case::Case;
 use crate::desk::settings::Settings;
 use crate::error::SessionError;
 use crate::progress::{Progress, RUNNING, Stage};
@@ -10,6 +11,8 @@ use std::thread::JoinHandle;
 pub(crate) enum Done {
     /// A session.
     Session(Box<Ended>),
+    /// A case that is to be looked at.
+    Case(Box<Case>),
     /// A batch of replays: how many failed, how many there were.
     Batch([usize; 2]),
 }

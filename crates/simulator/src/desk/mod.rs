@@ -7,6 +7,7 @@
 
 mod action;
 mod browse;
+mod check;
 mod draft;
 mod form;
 mod job;

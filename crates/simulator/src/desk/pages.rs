@@ -16,13 +16,17 @@ pub(crate) fn start(program: Program, form: &Form) -> Page<Action> {
         None => Item::main("Start the operation", "loads the case and begins", Action::Begin),
         Some(why) => Item::closed("Start the operation", why),
     };
+    let check = match form.lacks(program) {
+        None => Item::button("Check the case in pictures", "CT and MRI, labels, place of the opening", Action::Check),
+        Some(why) => Item::closed("Check the case in pictures", why),
+    };
     let chosen = Item::Text(format!("Case: {}", printable(&form.case.name)));
     let lacks = form.lacks(program).map(|why| Item::Note(why.into()));
     Page {
         title: "Trepan".into(),
         line: format!("{}: choose a case and start", what(program)),
         columns: vec![case(form), session(program, form), more(program)],
-        foot: [begin, chosen].into_iter().chain(lacks).collect(),
+        foot: [begin, check, chosen].into_iter().chain(lacks).collect(),
         escape: None,
     }
 }
@@ -116,13 +120,19 @@ fn session(program: Program, form: &Form) -> Vec<Item<Action>> {
     let mut items = vec![
         Item::Heading("Session".into()),
         Item::Field("Your name".into(), settings.person.clone(), person.into(), Action::Person),
-        Item::Field("Session".into(), form.session.clone(), "a name for its folder; may stay empty".into(), Action::Session),
+        Item::Field(
+            "Session".into(),
+            form.session.clone(),
+            "a name for its folder; may stay empty".into(),
+            Action::Session,
+        ),
         Item::Choice("Device".into(), devices, form.device(program), Action::Device),
         Item::Choice("First tool".into(), Form::tools(program), settings.tool, Action::Tool),
         Item::Choice("Quality".into(), Form::qualities(), form.quality(), Action::Quality),
     ];
     if program.has_bone() {
-        let name = if settings.flap_mm > 0.0 { "planned flap, mm across" } else { "planned flap, mm across; 0: a burr hole" };
+        let name =
+            if settings.flap_mm > 0.0 { "planned flap, mm across" } else { "planned flap, mm across; 0: a burr hole" };
         let amount = Amount { name: name.into(), value: settings.flap_mm, range: [0.0, 90.0], step: 2.0 };
         items.push(Item::Amount(amount, Action::Flap));
     }
@@ -170,7 +180,8 @@ pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action>
     }
     foot.push(Item::button("Back", "chooses nothing", Action::Home));
     foot.extend(folder.fault.clone().map(Item::Note));
-    let of_folders = [Item::Row(places), Item::Heading(format!("Folders: {}", folders.len()))].into_iter().chain(folders);
+    let of_folders =
+        [Item::Row(places), Item::Heading(format!("Folders: {}", folders.len()))].into_iter().chain(folders);
     let of_files = [Item::Heading(format!("Files: {count}"))].into_iter().chain(files);
     Page {
         title: goal.title().into(),
@@ -217,18 +228,16 @@ pub(crate) fn fault(fault: &SessionError) -> Page<Action> {
     let text = printable(&fault.to_string());
     let (problem, remedy) = split(&text);
     let usual = match fault {
-        SessionError::Internal(_) | SessionError::Picture(_) => "Try again with quality draft; if it comes again, report it.",
+        SessionError::Internal(_) | SessionError::Picture(_) => {
+            "Try again with quality draft; if it comes again, report it."
+        }
         _ => "Go back, change it on the start page, and start again.",
     };
     let remedy = remedy.map_or_else(|| usual.to_string(), capital);
     Page {
         title: "This did not work".into(),
         line: String::new(),
-        columns: vec![vec![
-            Item::Alert(capital(problem)),
-            Item::Heading("What to do".into()),
-            Item::Text(remedy),
-        ]],
+        columns: vec![vec![Item::Alert(capital(problem)), Item::Heading("What to do".into()), Item::Text(remedy)]],
         foot: vec![
             Item::main("Back to the start page", "your choices are kept", Action::Home),
             Item::button("Quit", "closes the window", Action::Close),
@@ -254,7 +263,10 @@ mod tests {
 
     #[test]
     fn an_error_is_split_into_cause_and_remedy() {
-        assert_eq!(split("cannot write x: full; give another folder"), ("cannot write x: full", Some("give another folder")));
+        assert_eq!(
+            split("cannot write x: full; give another folder"),
+            ("cannot write x: full", Some("give another folder"))
+        );
         assert_eq!(split("--flap 91 is out of range: give 0 to 90").1, Some("give 0 to 90"));
         assert_eq!(split("plain"), ("plain", None));
         let page = fault(&SessionError::Internal("a thread panicked".into()));
@@ -264,7 +276,8 @@ mod tests {
     #[test]
     fn no_path_of_an_image_is_shown() {
         let images = Source::Images { ct: Some("/data/Doe^Jane/ct".into()), mri: None, register: false };
-        let mut form = Form { case: Recent { name: "case".into(), source: images, ..Recent::default() }, ..Form::default() };
+        let mut form =
+            Form { case: Recent { name: "case".into(), source: images, ..Recent::default() }, ..Form::default() };
         form.settings.recent = vec![form.case.clone()];
         let page = start(Program::Integrated, &form);
         assert!(!format!("{page:?}").contains("Jane"));

@@ -22,9 +22,15 @@ pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Act
     let mut items: Vec<Item<Action>> = debrief.lesson.iter().cloned().map(Item::Heading).collect();
     items.extend([verdict, Item::Table(table(&debrief))]);
     if debrief.earlier > 0 {
-        items.push(Item::Note(format!("compared with {} earlier sessions of {}", debrief.earlier, printable(&session.person))));
+        items.push(Item::Note(format!(
+            "compared with {} earlier sessions of {}",
+            debrief.earlier,
+            printable(&session.person)
+        )));
     }
-    items.extend(debrief.curves.iter().map(|(name, values)| Item::Curve(format!("{name}, session by session"), values.clone())));
+    items.extend(
+        debrief.curves.iter().map(|(name, values)| Item::Curve(format!("{name}, session by session"), values.clone())),
+    );
     Page {
         title: "Result".into(),
         line: format!("{}, case {}, device {}", printable(&session.title), session.case, session.device),
@@ -91,7 +97,11 @@ pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: O
             None => Item::main("Begin", lesson.about.clone(), Action::Lesson(at)),
             Some(why) => Item::closed("Begin", why),
         };
-        [Item::Heading(lesson.title.clone()), Item::Text(lesson.about.clone()), Item::Row(vec![begin, Item::Note(state)])]
+        [
+            Item::Heading(lesson.title.clone()),
+            Item::Text(lesson.about.clone()),
+            Item::Row(vec![begin, Item::Note(state)]),
+        ]
     };
     Page {
         title: "Lessons".into(),

@@ -30,8 +30,6 @@ pub(crate) struct Settings {
     pub quality: String,
     /// Diameter of the planned flap, mm; 0 for a burr hole.
     pub flap_mm: f32,
-    /// Whether the case is checked in pictures before the operation.
-    pub check: bool,
     /// Folder that was looked into last.
     pub folder: Option<PathBuf>,
     /// Recent cases, the newest first.
@@ -48,7 +46,6 @@ impl Default for Settings {
             tool: 0,
             quality: "auto".into(),
             flap_mm: 0.0,
-            check: false,
             folder: None,
             recent: Vec::new(),
             seconds: BTreeMap::new(),

@@ -2,9 +2,12 @@
 
 use crate::Inputs;
 use crate::batch;
+use crate::case::Case;
 use crate::case::cache::Cache;
+use crate::case::choice::case_to_check;
 use crate::desk::action::Action;
 use crate::desk::browse::{Folder, Goal};
+use crate::desk::check::Check;
 use crate::desk::draft;
 use crate::desk::form::Form;
 use crate::desk::job::{Done, Job, Work};
@@ -34,6 +37,8 @@ enum View {
     Browse(Goal, Folder, String),
     /// A page that does not change.
     Page(Box<Page<Action>>),
+    /// A case in pictures, and why the last click did nothing.
+    Check(Box<Check>, Option<&'static str>),
     /// A session that is loading, running or writing; its case's name.
     Session(Job, String),
     /// Nothing more.
@@ -132,11 +137,14 @@ impl Desk {
 
     /// Takes what an ended job came to.
     fn take(&mut self, done: Result<Done, SessionError>) {
+        if let Ok(Done::Case(case)) = done {
+            return self.look_at(*case);
+        }
         self.view = match &done {
             Err(SessionError::Cancelled) => View::Start,
             Err(fault) => View::Page(Box::new(pages::fault(fault))),
             Ok(_) if self.direct => View::Closed,
-            Ok(Done::Batch(_)) => View::Start,
+            Ok(Done::Batch(_) | Done::Case(_)) => View::Start,
             Ok(Done::Session(ended)) => {
                 self.form.case.hash = ended.case.clone().unwrap_or_default();
                 self.form.settings.remember(self.form.case.clone());
@@ -146,6 +154,32 @@ impl Desk {
         self.keep();
         self.direct = false;
         self.last = Some(done);
+    }
+
+    /// Shows a case in pictures.
+    fn look_at(&mut self, case: Case) {
+        let Recent { name, opening, .. } = self.form.case.clone();
+        match Check::of(case, name, opening, self.device.clone()) {
+            Ok(check) => self.view = View::Check(Box::new(check), None),
+            Err(fault) => self.fail(fault),
+        }
+    }
+
+    /// Loads the chosen case to look at it.
+    fn check(&mut self) {
+        let options = match self.form.options(&self.base, self.program) {
+            // A place that was chosen before may not fit: the case is looked at without it.
+            Ok(options) => options,
+            Err(fault) => return self.fail(fault),
+        };
+        let Recent { name, hash, .. } = self.form.case.clone();
+        let (program, built_in, progress) = (self.program, self.built_in.clone(), Progress::default());
+        let loading = progress.clone();
+        let work: Work = Box::new(move |_| {
+            let case = case_to_check(program, &options, built_in, &hash, &loading)?;
+            Ok(Done::Case(Box::new(case)))
+        });
+        self.start(work, name, true, progress);
     }
 
     fn fail(&mut self, fault: SessionError) {
@@ -192,7 +226,8 @@ impl Desk {
     /// Replays a session on its case, which is a recent one or the built-in one.
     fn replay(&mut self, recording: &Path) {
         let name = Kept::of(recording.parent().unwrap_or(recording)).map(|kept| kept.case);
-        let is = |case: &&Recent| name.as_ref().is_some_and(|name| case.hash.get(..8).is_some_and(|h| name.ends_with(h)));
+        let is =
+            |case: &&Recent| name.as_ref().is_some_and(|name| case.hash.get(..8).is_some_and(|h| name.ends_with(h)));
         let built_in = || Recent { name: self.built_in.name.unwrap_or_default().into(), ..Recent::default() };
         self.form.case = self.form.settings.recent.iter().find(is).cloned().unwrap_or_else(built_in);
         self.begin(self.form.replay(&self.base, self.program, recording));
@@ -230,12 +265,11 @@ impl Host for Desk {
             View::Start => Shown::Page(Box::new(pages::start(self.program, &self.form))),
             View::Browse(goal, folder, written) => Shown::Page(Box::new(pages::browse(*goal, folder, written))),
             View::Page(page) => Shown::Page(page.clone()),
+            View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault))),
             View::Session(job, name) => match (job.is_running(), guest) {
                 (true, true) => Shown::Session(None),
                 (true, false) => Shown::Page(Box::new(pages::writing())),
-                (false, true) => {
-                    Shown::Session(Some(Box::new(pages::loading(name, job.loaded(&self.form.settings)))))
-                }
+                (false, true) => Shown::Session(Some(Box::new(pages::loading(name, job.loaded(&self.form.settings))))),
                 (false, false) => Shown::Page(Box::new(pages::loading(name, job.loaded(&self.form.settings)))),
             },
             View::Closed => Shown::Nothing,
@@ -265,7 +299,8 @@ impl Host for Desk {
             Action::Session(name) => form.session = name,
             Action::Person(name) => form.settings.person = name,
             Action::Device(at) => {
-                form.settings.device = form.devices(self.program).get(at).map(|device| device.0.clone()).unwrap_or_default();
+                form.settings.device =
+                    form.devices(self.program).get(at).map(|device| device.0.clone()).unwrap_or_default();
             }
             Action::Tool(at) => form.settings.tool = at,
             Action::Quality(at) => {
@@ -295,6 +330,33 @@ impl Host for Desk {
 }
 
 impl Desk {
+    /// Does what changes the pictures of a case.
+    fn look(&mut self, action: Action) {
+        let View::Check(check, fault) = &mut self.view else { return };
+        let done = match action {
+            Action::OpenAt(at) => check.open_at(at).map(|found| {
+                *fault =
+                    (!found).then_some("There is no bone under this click: turn the head, then click on the skull");
+            }),
+            Action::Turn(by) => check.turn(by),
+            Action::Blend(share) => {
+                check.blend(share);
+                Ok(())
+            }
+            Action::Slide(axis, mm) => {
+                check.slide(axis, mm);
+                Ok(())
+            }
+            _ => Ok(()),
+        };
+        if self.form.case.opening != check.opening {
+            self.form.case.opening = check.opening;
+            // The case is built anew for another opening.
+            self.form.case.hash.clear();
+        }
+        done.err().into_iter().for_each(|fault| self.fail(fault));
+    }
+
     /// Does what leads to another page.
     fn leave(&mut self, action: Action) {
         match action {
@@ -330,8 +392,12 @@ impl Desk {
                 // The lesson brings its own flap.
                 self.begin(options.map(|options| Options { lesson, flap: self.base.flap, ..options }));
             }
+            Action::Check => self.check(),
+            Action::OpenAt(_) | Action::Turn(_) | Action::Blend(_) | Action::Slide(..) => self.look(action),
             Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept()))),
-            Action::Result(folder) => self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons()))),
+            Action::Result(folder) => {
+                self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
+            }
             Action::Report(folder) => open(&folder.join("report.html")),
             Action::Replay(folder) => self.replay(&folder.join("session.mcap")),
             Action::Close => self.view = View::Closed,
@@ -342,7 +408,13 @@ impl Desk {
 
 /// Opens a page in the user's browser.
 fn open(page: &Path) {
-    let opener = if cfg!(target_os = "macos") { "open" } else if cfg!(windows) { "explorer" } else { "xdg-open" };
+    let opener = if cfg!(target_os = "macos") {
+        "open"
+    } else if cfg!(windows) {
+        "explorer"
+    } else {
+        "xdg-open"
+    };
     let begun = Command::new(opener).arg(page).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     begun.err().into_iter().for_each(|fault| tracing::warn!("{opener}: {fault}; open {} by hand", page.display()));
 }

@@ -68,7 +68,10 @@ impl Debrief {
         let marks: Vec<&Mark> = lesson.iter().flat_map(|lesson| &lesson.marks).collect();
         let is_marked = |mark: &Mark| marks.iter().any(|known| known.path == mark.path);
         let rows = marks.iter().copied().chain(usual.iter().filter(|mark| !is_marked(mark)));
-        let rows: Vec<Row> = rows.filter(|m| !m.limit().is_empty() || m.value(summary).is_some()).map(|m| row(m, summary, earlier)).collect();
+        let rows: Vec<Row> = rows
+            .filter(|m| !m.limit().is_empty() || m.value(summary).is_some())
+            .map(|m| row(m, summary, earlier))
+            .collect();
         let passed = lesson.map(|_| rows.iter().all(|row| row.passed != Some(false)));
         let curves = CURVES.map(|at| {
             let mark = &usual[at];

@@ -46,7 +46,8 @@ impl Kept {
     /// Lists the sessions in the folders of programs below these folders, the newest first.
     pub fn list(roots: &[PathBuf]) -> Vec<Self> {
         let below = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-        let mut folders: Vec<PathBuf> = roots.iter().flat_map(|root| below(root)).flat_map(|program| below(&program)).collect();
+        let mut folders: Vec<PathBuf> =
+            roots.iter().flat_map(|root| below(root)).flat_map(|program| below(&program)).collect();
         folders.sort_by_key(|folder| std::cmp::Reverse(folder.file_name().map(std::ffi::OsStr::to_os_string)));
         folders.iter().take(MOST).filter_map(|folder| Self::of(folder)).collect()
     }
@@ -75,7 +76,8 @@ mod tests {
         let write = |title: &str, person: &str, lesson: Option<&str>| {
             let folder = home.path().join("integrated").join(title);
             fs::create_dir_all(&folder).unwrap();
-            let summary = json!({ "app": "integrated", "case": "c", "device": "mouse", "person": person, "lesson": lesson });
+            let summary =
+                json!({ "app": "integrated", "case": "c", "device": "mouse", "person": person, "lesson": lesson });
             fs::write(folder.join("summary.json"), summary.to_string()).unwrap();
         };
         for (title, person, lesson) in [
