@@ -50,12 +50,17 @@ pub trait Host {
     fn dropped(&mut self, path: PathBuf);
 }
 
+/// A session that another thread sent.
+type Sent = Box<dyn Session + Send>;
+/// What goes back to its thread.
+type Returned = (Sent, Painter, Result<(), WindowError>);
+
 /// A session on its way to the window.
 struct Offer {
-    session: Box<dyn Session + Send>,
+    session: Sent,
     painter: Painter,
     start: Start,
-    back: Sender<(Box<dyn Session + Send>, Painter, Result<(), WindowError>)>,
+    back: Sender<Returned>,
 }
 
 /// The window, as seen by the threads that run sessions.
@@ -99,13 +104,13 @@ impl Offers {
 const POLL: Duration = Duration::from_millis(50);
 
 /// Type of the session and the painter in the window.
-type Lending = Lent<Box<dyn Session + Send>, Painter>;
+type Lending = Lent<Sent, Painter>;
 
 /// The session in the window.
 struct Guest {
-    window: Window<Box<dyn Session + Send>, Painter>,
+    window: Window<Sent, Painter>,
     lent: Lending,
-    back: Sender<(Box<dyn Session + Send>, Painter, Result<(), WindowError>)>,
+    back: Sender<Returned>,
 }
 
 impl Guest {
@@ -126,11 +131,7 @@ impl Guest {
     }
 }
 
-fn give_back(
-    back: Sender<(Box<dyn Session + Send>, Painter, Result<(), WindowError>)>,
-    (session, painter): (Box<dyn Session + Send>, Painter),
-    fault: Option<String>,
-) {
+fn give_back(back: Sender<Returned>, (session, painter): (Sent, Painter), fault: Option<String>) {
     // A thread that panicked does not wait for its session.
     _ = back.send((session, painter, fault.map_or(Ok(()), |why| Err(WindowError::Failed(why)))));
 }

@@ -140,6 +140,8 @@ impl<A> Item<A> {
     }
 }
 
+/// Colour of text.
+const INK: Color32 = Color32::from_gray(225);
 /// Width of a column below which columns stand below each other, points.
 const NARROW: f32 = 300.0;
 /// Largest width of the page, points.
@@ -214,15 +216,16 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
             ui.add_space(8.0);
             ui.label(RichText::new(text).size(18.0).strong().color(SKY));
         }
-        Item::Text(text) => _ = ui.label(RichText::new(text).size(15.0)),
+        Item::Text(text) => _ = ui.label(RichText::new(text).size(15.0).color(INK)),
         Item::Note(text) => _ = ui.label(RichText::new(text).color(PALE)),
         Item::Verdict(passed, text) => {
             let (word, colour) = if *passed { ("passed", GREEN) } else { ("not passed", ORANGE) };
             ui.label(RichText::new(format!("{word}: {text}")).size(15.0).strong().color(colour));
         }
         Item::Label(text, [r, g, b]) => {
-            ui.label(RichText::new("■").color(Color32::from_rgb(*r, *g, *b)));
-            ui.label(text);
+            let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
+            ui.painter().rect_filled(patch, 2.0, Color32::from_rgb(*r, *g, *b));
+            ui.label(RichText::new(text).color(INK));
         }
         Item::Alert(text) => {
             egui::Frame::new().fill(VERMILION).inner_margin(10.0).show(ui, |ui| {
@@ -342,7 +345,7 @@ fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {
     egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).show(ui, |ui| {
         for (at, row) in rows.iter().enumerate() {
             for cell in row {
-                let text = RichText::new(cell);
+                let text = RichText::new(cell).size(14.0).color(INK);
                 ui.label(if at == 0 { text.strong() } else { text });
             }
             ui.end_row();

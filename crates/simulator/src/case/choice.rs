@@ -47,8 +47,8 @@ pub(crate) fn open_case(
     Ok((case, models.ok_or_else(unsettled)?))
 }
 
-/// Opens a case to look at, without the models of a session: the named folder, the cached case of
-/// this hash, else the images in voxels and tetrahedra of preset `usual`.
+/// Opens a case to look at, without the models of a session. It is the named folder, the cached
+/// case of this hash, else the images in voxels and tetrahedra of preset `usual`.
 pub(crate) fn case_to_check(
     program: Program,
     options: &Options,

@@ -1,5 +1,5 @@
-//! Checks of a case in pictures before the operation: do CT and MRI fit, is left left, what was
-//! found in the brain, where will the skull be opened.
+//! Shows a case in pictures before the operation: sides, fit of CT and MRI, tissue labels, place of
+//! the opening.
 //!
 //! # Practice
 //! The slices show the skull's density in the case's voxels and the MRI around the brain, as the
@@ -18,7 +18,7 @@ use trepan_geometry::{Aabb, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Site;
 use trepan_render::window::{Amount, Item, Page, Picture};
-use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook};
+use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// Width and height of the picture of the head, pixels.
@@ -79,6 +79,25 @@ struct Head {
     centre: Vec3,
     /// Where the skull is opened.
     place: Option<Vec3>,
+}
+
+impl Head {
+    fn view(&self) -> View {
+        self.camera.view(HEAD[0] as f32 / HEAD[1] as f32)
+    }
+
+    /// A cross on the place of the opening, and R and L on the sides of the patient.
+    fn marks(&self) -> Vec<([f32; 2], String)> {
+        let half_mm = 0.5 * self.bone.bounds().size().x;
+        let sides = [("R", half_mm), ("L", -half_mm)].map(|(side, mm)| (side, self.centre + mm * Vec3::X));
+        let all = self.place.map(|place| ("+", place)).into_iter().chain(sides);
+        let view = self.view();
+        let on_picture = |(text, point): (&str, Vec3)| {
+            let (at, _) = view.project(point);
+            ([0.5 + 0.5 * at.x, 0.5 - 0.5 * at.y].map(|share| share.clamp(0.03, 0.97)), text.to_string())
+        };
+        all.map(on_picture).collect()
+    }
 }
 
 impl Check {
@@ -142,7 +161,7 @@ impl Check {
     /// Chooses the opening under a click on the head; false where there is no bone.
     pub fn open_at(&mut self, [x, y]: [f32; 2]) -> Result<bool, SessionError> {
         let Some(head) = &mut self.head else { return Ok(false) };
-        let view = head.camera.view(HEAD[0] as f32 / HEAD[1] as f32);
+        let view = head.view();
         let ray = view.ray(Vec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y));
         let Some(place) = first_bone(&head.bone, view.eye, ray) else { return Ok(false) };
         head.place = Some(place);
@@ -221,7 +240,7 @@ impl Check {
                 name: "head".into(),
                 image: shown.image.clone(),
                 height: HEAD[1] as f32,
-                letters: Vec::new(),
+                letters: shown.marks(),
                 clicked: Some(Action::OpenAt),
                 dragged: Some(Action::Turn),
             }));

@@ -1,7 +1,7 @@
 //! A draft of the scene in the window while its session is still loading.
 //!
 //! # Practice
-//! It needs the cached case only, not the models that run: skull and brain are drawn with few rays
+//! It needs the skull of the cached case only, not the models that run, and is drawn with few rays
 //! until the session takes its place.
 
 use crate::case::cache::Cache;
@@ -19,10 +19,12 @@ use trepan_volume::BoneVolume;
 /// Share of the picture's pixels along an edge.
 const DETAIL: f32 = 0.4;
 
+/// Width and height of the first picture, pixels.
+const SIZE: [u32; 2] = [640, 480];
+
 /// A scene that can be looked at only.
 struct Draft {
     case: String,
-    has_bone: bool,
 }
 
 impl Session for Draft {
@@ -32,8 +34,7 @@ impl Session for Draft {
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
-        let slices = SliceLook { half_height_mm: None, ..SliceLook::default() };
-        Frame { show_bone: self.has_bone, slices, ..Frame::of(camera) }
+        Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) }
     }
 
     fn capture(&mut self, _: Capture, _: Image) {}
@@ -44,29 +45,23 @@ impl Session for Draft {
 pub(crate) fn show(
     (cache, hash): (&Cache, &str),
     name: String,
-    with_bone: bool,
     device: Result<Gpu, GpuError>,
     (stage, loading): (&Stage, &Progress),
 ) -> Result<bool, SessionError> {
     let Some(folder) = cache.find(hash) else { return Ok(false) };
-    let case = folder::load(&folder)?;
-    let Some(site) = case.opening.map(Into::into) else { return Ok(false) };
-    let bone = case.skull.as_ref().filter(|_| with_bone).map(|skull| BoneVolume::new(skull, case.isovalue_hu));
-    let bone = bone.transpose().map_err(|fault| SessionError::Case(fault.to_string()))?.map(Arc::new);
-    let brain = case.brain.as_ref();
-    let data = SceneData {
-        bone: bone.clone(),
-        brain: brain.map(|brain| &brain.mesh),
-        mri: brain.map(|brain| &brain.mri),
-        tint: None,
-    };
-    let mut painter = Painter::on(device, &data, [640, 480])?;
+    let Some(skull) = folder::draft_skull(&folder)? else { return Ok(false) };
+    let bone = BoneVolume::new(&skull.hu, skull.isovalue_hu).map_err(|fault| SessionError::Case(fault.to_string()))?;
+    let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None };
+    // A software driver needs seconds to compile its programs.
+    let by_processor = device.as_ref().map_or(true, Gpu::is_software);
+    let mut painter =
+        if by_processor { Painter::by_processor(&data, SIZE)? } else { Painter::on(device, &data, SIZE)? };
     painter.set_quality(true, DETAIL)?;
-    let start = Start { detail: DETAIL, ..Start::with(camera(&site), Pose::IDENTITY) };
+    let start = Start { detail: DETAIL, ..Start::with(camera(&skull.opening.into()), Pose::IDENTITY) };
     // The session itself may be in the window already, or loading was given up.
     if loading.is_over() {
         return Ok(false);
     }
-    stage.run(painter, Draft { case: name, has_bone: bone.is_some() }, start);
+    stage.run(painter, Draft { case: name }, start);
     Ok(true)
 }

@@ -123,12 +123,11 @@ impl Desk {
         let cache = Cache::of(&options.patient).ok();
         let again = cache.as_ref().is_some_and(|cache| !hash.is_empty() && cache.find(&hash).is_some());
         let progress = Progress::default();
-        if let Some(cache) = cache.filter(|_| again) {
-            let (stage, device, name, bone) =
-                (self.stage.clone(), self.device.clone(), name.clone(), self.program.has_bone());
+        if let Some(cache) = cache.filter(|_| again && self.program.has_bone()) {
+            let (stage, device, name) = (self.stage.clone(), self.device.clone(), name.clone());
             let loading = progress.clone();
             std::thread::spawn(move || {
-                let shown = draft::show((&cache, &hash), name, bone, device, (&stage, &loading));
+                let shown = draft::show((&cache, &hash), name, device, (&stage, &loading));
                 shown.err().into_iter().for_each(|fault| tracing::debug!("no draft of the scene: {fault}"));
             });
         }
@@ -207,7 +206,7 @@ impl Desk {
         self.view = View::Start;
         let case = &mut self.form.case;
         match goal {
-            Goal::Recording => return self.begin(self.form.replay(&self.base, self.program, &path)),
+            Goal::Recording => self.begin(self.form.replay(&self.base, self.program, &path)),
             Goal::Case => {
                 *case = Recent { name: "case folder".into(), source: Source::Folder(path), ..Recent::default() };
             }
