@@ -331,7 +331,6 @@ impl Session {
         company: Company,
         stop: &Stop,
     ) -> Album {
-        self.place.progress.run();
         let Some(painter) = graphics.as_mut().ok().and_then(|g| g.painter.take()) else {
             picture::wait(eyes, stop);
             return Album::default();
@@ -341,7 +340,9 @@ impl Session {
             return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
         };
         let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
+        let progress = &self.place.progress;
         let opened = window::Opened {
+            progress,
             stage,
             table,
             case,

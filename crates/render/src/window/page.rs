@@ -219,8 +219,8 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         Item::Text(text) => _ = ui.label(RichText::new(text).size(15.0).color(INK)),
         Item::Note(text) => _ = ui.label(RichText::new(text).color(PALE)),
         Item::Verdict(passed, text) => {
-            let (word, colour) = if *passed { ("passed", GREEN) } else { ("not passed", ORANGE) };
-            ui.label(RichText::new(format!("{word}: {text}")).size(15.0).strong().color(colour));
+            let colour = if *passed { GREEN } else { ORANGE };
+            ui.label(RichText::new(text).size(18.0).strong().color(colour));
         }
         Item::Label(text, [r, g, b]) => {
             let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());

@@ -62,6 +62,7 @@ pub(crate) fn show(
     if loading.is_over() {
         return Ok(false);
     }
+    tracing::debug!("draft of the scene after {:.0} ms", loading.so_far().1);
     stage.run(painter, Draft { case: name }, start);
     Ok(true)
 }

@@ -6,6 +6,7 @@
 
 use crate::SessionError;
 use crate::program::Program;
+use crate::progress::Progress;
 use crate::report::page::Shot;
 use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
 use crate::run::stop::Stop;
@@ -34,6 +35,8 @@ const REQUEST_S: f64 = 0.1;
 pub(crate) struct Opened<'a> {
     /// The window.
     pub stage: &'a Stage,
+    /// Progress of loading, which ends when the session is in the window.
+    pub progress: &'a Progress,
     /// Patient, plan and program.
     pub table: &'a SessionSetup,
     /// Name of the case, without the patient's name.
@@ -200,6 +203,7 @@ pub(crate) fn run<S: window::Session + Send>(
     let detail = opened.table.models.setup.picture.detail as f32;
     let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
     let counted = Counted { session, pictures: 0, seconds: [0.0; 2] };
+    opened.progress.run();
     let closed = opened.stage.run(painter, counted, start);
     let (mut painter, Counted { session, pictures, seconds: [from, to] }) = (closed.renderer, closed.session);
     (album.frames, album.seconds) = (album.frames + pictures, to - from);
