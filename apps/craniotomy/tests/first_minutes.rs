@@ -111,7 +111,7 @@ impl Drop for Person {
 const START: [u32; 2] = [95, 755];
 const BACK: [u32; 2] = [110, 755];
 const OPEN_CT: [u32; 2] = [160, 135];
-const FIRST_FOLDER: [u32; 2] = [200, 232];
+const FIRST_FOLDER: [u32; 2] = [200, 186];
 const USE: [u32; 2] = [85, 755];
 
 #[test]

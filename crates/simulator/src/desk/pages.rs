@@ -223,9 +223,18 @@ pub(crate) fn writing() -> Page<Action> {
     Page { title: "Writing the report".into(), line: "pictures, scores, drilled skull".into(), ..Page::default() }
 }
 
-/// The page of an error: what is wrong and what to do.
-pub(crate) fn fault(fault: &SessionError) -> Page<Action> {
-    let text = printable(&fault.to_string());
+/// The page of an error: what is wrong and what to do. Paths of the images are left out, since they
+/// may name a patient.
+pub(crate) fn fault(fault: &SessionError, source: &Source) -> Page<Action> {
+    let images = match source {
+        Source::Images { ct, mri, .. } => [(ct.as_deref(), "the CT"), (mri.as_deref(), "the MRI")],
+        _ => [(None, ""); 2],
+    };
+    let without = |text: String, (path, name): (Option<&Path>, &str)| match path {
+        Some(path) => text.replace(&path.display().to_string(), name),
+        None => text,
+    };
+    let text = printable(&images.into_iter().fold(fault.to_string(), without));
     let (problem, remedy) = split(&text);
     let usual = match fault {
         SessionError::Internal(_) | SessionError::Picture(_) => {
@@ -269,7 +278,7 @@ mod tests {
         );
         assert_eq!(split("--flap 91 is out of range: give 0 to 90").1, Some("give 0 to 90"));
         assert_eq!(split("plain"), ("plain", None));
-        let page = fault(&SessionError::Internal("a thread panicked".into()));
+        let page = fault(&SessionError::Internal("a thread panicked".into()), &Source::BuiltIn);
         assert!(matches!(&page.columns[0][0], Item::Alert(text) if text == "A thread panicked"));
     }
 
@@ -279,6 +288,8 @@ mod tests {
         let mut form =
             Form { case: Recent { name: "case".into(), source: images, ..Recent::default() }, ..Form::default() };
         form.settings.recent = vec![form.case.clone()];
+        let broken = SessionError::Case("/data/Doe^Jane/ct: no DICOM picture lies in it; give another".into());
+        assert!(!format!("{:?}", fault(&broken, &form.case.source)).contains("Jane"));
         let page = start(Program::Integrated, &form);
         assert!(!format!("{page:?}").contains("Jane"));
         assert!(format!("{:?}", page.foot).contains("does: None"), "an MRI is missing");

@@ -141,7 +141,7 @@ impl Desk {
         }
         self.view = match &done {
             Err(SessionError::Cancelled) => View::Start,
-            Err(fault) => View::Page(Box::new(pages::fault(fault))),
+            Err(fault) => View::Page(Box::new(pages::fault(fault, &self.form.case.source))),
             Ok(_) if self.direct => View::Closed,
             Ok(Done::Batch(_) | Done::Case(_)) => View::Start,
             Ok(Done::Session(ended)) => {
@@ -182,7 +182,7 @@ impl Desk {
     }
 
     fn fail(&mut self, fault: SessionError) {
-        self.view = View::Page(Box::new(pages::fault(&fault)));
+        self.view = View::Page(Box::new(pages::fault(&fault, &self.form.case.source)));
         self.last = Some(Err(fault));
     }
 
