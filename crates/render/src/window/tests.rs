@@ -409,7 +409,7 @@ fn page() -> Page<&'static str> {
     let choosable = |name: &str, open| Choosable { name: name.into(), hint: "why".into(), open };
     let amount = Amount { name: "flap, mm".into(), value: 10.0, range: [0.0, 90.0], step: 1.0 };
     let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
-    let picture = super::Picture {
+    let picture = Picture {
         name: "head".into(),
         image: (1, image),
         height: 200.0,
