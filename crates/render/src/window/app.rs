@@ -57,6 +57,7 @@ pub(super) struct Window<S, D> {
     last: Option<(View, egui::TextureId)>,
     /// Time of the last picture, s.
     pub(super) drawn_at: f64,
+    over: bool,
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
@@ -82,7 +83,13 @@ impl<S: Session, D: Draws> Window<S, D> {
             quality: Quality::new(!hardware, start.detail),
             last: None,
             drawn_at: 0.0,
+            over: false,
         }
+    }
+
+    /// Whether the session is finished, cannot be drawn, or was closed by the user.
+    pub fn is_over(&self) -> bool {
+        self.over
     }
 
     /// Draws one picture of the whole window.
@@ -109,9 +116,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         if self.help {
             keys::help(ui.ctx(), &self.panel.actions);
         }
-        if shared.fault.is_some() {
-            ui.send_viewport_cmd(egui::ViewportCommand::Close);
-        }
+        self.over |= shared.fault.is_some();
         let rate_hz = self.start.rate_hz.min(self.quality.most_hz());
         let period = Duration::from_secs_f32(1.0 / rate_hz.clamp(1.0, 240.0));
         ui.request_repaint_after(period.saturating_sub(began.elapsed()));
@@ -143,7 +148,7 @@ impl<S: Session, D: Draws> Window<S, D> {
                 #[cfg(feature = "sound")]
                 Command::Mute => self.audio.muted ^= true,
                 Command::Quit if std::mem::take(&mut self.help) => (),
-                Command::Quit => ui.send_viewport_cmd(egui::ViewportCommand::Close),
+                Command::Quit => self.over = true,
                 of_view => self.look.react(of_view, &mut self.hand.camera),
             }
             self.answers.give(answers::done(command, keys::name(command), &self.look, self.large), now);
@@ -192,9 +197,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         let now = self.panel.timeline.as_ref().map_or(input.seconds, |timeline| timeline.at_s);
         self.traces.force.push(now, self.panel.force_n.into());
         self.traces.rate.push(now, self.panel.rate_hz.into());
-        if self.panel.finished {
-            ui.send_viewport_cmd(egui::ViewportCommand::Close);
-        }
+        self.over |= self.panel.finished;
     }
 
     /// The tool whose number key was pressed.
@@ -356,5 +359,8 @@ fn registered(
 impl<S: Session, D: Draws> eframe::App for Window<S, D> {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         self.show(ui, frame.wgpu_render_state());
+        if self.over {
+            ui.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
     }
 }

@@ -39,11 +39,13 @@ mod banner;
 mod capture;
 mod draws;
 mod guide;
+mod host;
 mod input;
 mod keys;
 mod look;
 #[cfg(feature = "sound")]
 mod loudspeaker;
+mod page;
 mod palette;
 mod panel;
 mod panel_text;
@@ -60,18 +62,21 @@ mod tool_icon;
 
 pub use capture::Capture;
 pub use draws::{Draws, Refined};
+pub use host::{Host, Offers, Shown, Stage, open, stage};
 pub use input::WindowInput;
+pub use page::{Amount, Button, Choosable, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};
 
 use crate::{Camera, Frame, Image, Renderer};
-use std::cell::RefCell;
+use std::any::Any;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use trepan_geometry::Pose;
 use trepan_gpu::Gpu;
 
 /// The session behind the window. Called on the window's thread, once per picture; must not wait.
-pub trait Session {
+pub trait Session: Any {
     /// Processes the user's input and returns the panel.
     fn update(&mut self, input: &WindowInput) -> Panel;
 
@@ -85,6 +90,24 @@ pub trait Session {
 
     /// Receives a screenshot of the whole window.
     fn capture(&mut self, what: Capture, picture: Image);
+}
+
+impl Session for Box<dyn Session + Send> {
+    fn update(&mut self, input: &WindowInput) -> Panel {
+        (**self).update(input)
+    }
+
+    fn frame(&self, camera: Camera) -> Frame<'_> {
+        (**self).frame(camera)
+    }
+
+    fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        (**self).surface(ray)
+    }
+
+    fn capture(&mut self, what: Capture, picture: Image) {
+        (**self).capture(what, picture);
+    }
 }
 
 /// Initial state of the window.
@@ -153,43 +176,48 @@ where
 {
     let shared = renderer.device().filter(|gpu| gpu.can_be_shared()).cloned();
     let lent: Lent<S, D> = Rc::new(RefCell::new(Some(Shared { session, renderer, shown: false, fault: None })));
-    let result = display().and_then(|()| open_somehow(title, shared.as_ref(), &lent, start));
+    let shown = Rc::new(Cell::new(false));
+    let create = |device: Option<&Gpu>| -> Box<dyn eframe::App> {
+        shown.set(true);
+        Box::new(app::Window::new(lent.clone(), start, device.is_none()))
+    };
+    let opened = display().and_then(|()| open_somehow(title, shared.as_ref(), start.size, &create, &shown));
     let back = lent.borrow_mut().take();
     let Some(Shared { session, renderer, fault, .. }) = back else {
         unreachable!("only this line takes what was lent")
     };
-    Closed { session, renderer, result: fault.map_or(result, |why| Err(WindowError::Failed(why))) }
+    Closed { session, renderer, result: fault.map_or(opened, |why| Err(WindowError::Failed(why))) }
 }
 
+/// Makes the application of a window on a device, or on a device of its own.
+type Create<'a> = dyn Fn(Option<&Gpu>) -> Box<dyn eframe::App> + 'a;
+
 /// Opens the window on the rendering device, or on a separate device if that cannot present.
-fn open_somehow<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
-where
-    S: Session + 'static,
-    D: Draws + 'static,
-{
-    let shown = || lent.borrow().as_ref().is_some_and(|shared| shared.shown);
-    match open(title, gpu, lent, start) {
-        Err(WindowError::Failed(why)) if gpu.is_some() && !shown() => {
-            let again = open(title, None, lent, start);
-            if again.is_ok() || shown() { again } else { Err(WindowError::Failed(why)) }
+/// `shown` is set once the application is made.
+fn open_somehow(
+    title: &str,
+    gpu: Option<&Gpu>,
+    size: [f32; 2],
+    create: &Create<'_>,
+    shown: &Cell<bool>,
+) -> Result<(), WindowError> {
+    match open_on(title, gpu, size, create) {
+        Err(WindowError::Failed(why)) if gpu.is_some() && !shown.get() => {
+            let again = open_on(title, None, size, create);
+            if again.is_ok() || shown.get() { again } else { Err(WindowError::Failed(why)) }
         }
         result => result,
     }
 }
 
 /// Opens the window and runs it until it is closed.
-fn open<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
-where
-    S: Session + 'static,
-    D: Draws + 'static,
-{
-    let (lent, copies) = (lent.clone(), gpu.is_none());
+fn open_on(title: &str, gpu: Option<&Gpu>, size: [f32; 2], create: &Create<'_>) -> Result<(), WindowError> {
     let show = || {
-        let create: eframe::AppCreator<'_> = Box::new(move |context| {
+        let create: eframe::AppCreator<'_> = Box::new(|context| {
             context.egui_ctx.set_theme(eframe::egui::Theme::Dark);
-            Ok(Box::new(app::Window::new(lent, start, copies)))
+            Ok(create(gpu))
         });
-        eframe::run_native(title, options(gpu, &start), create)
+        eframe::run_native(title, options(gpu, size), create)
     };
     // A missing system library makes the windowing crate panic; the session must survive that.
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
@@ -210,8 +238,7 @@ pub fn display() -> Result<(), WindowError> {
     Ok(())
 }
 
-fn options(gpu: Option<&Gpu>, start: &Start) -> eframe::NativeOptions {
-    let [width, height] = start.size;
+fn options(gpu: Option<&Gpu>, [width, height]: [f32; 2]) -> eframe::NativeOptions {
     let mut options = eframe::NativeOptions {
         viewport: eframe::egui::ViewportBuilder::default()
             .with_inner_size([width, height])
@@ -231,7 +258,7 @@ fn options(gpu: Option<&Gpu>, start: &Start) -> eframe::NativeOptions {
     options
 }
 
-fn words(panic: &(dyn std::any::Any + Send)) -> String {
+fn words(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
     text.unwrap_or("no reason given").into()
 }

@@ -140,7 +140,7 @@ impl Bench {
     }
 
     fn closes(&self) -> bool {
-        self.commands().contains(&ViewportCommand::Close)
+        self.window.state().is_over()
     }
 }
 
@@ -510,5 +510,88 @@ fn no_control_is_out_of_reach_on_small_and_large_screens() {
         bench.window.run_steps(10);
         let last = bench.window.get_by_label("Quit (Q)").rect();
         assert!(screen.contains_rect(last), "the last button is at {last:?} of {screen:?}");
+    }
+}
+
+/// Actions of a page under test, by the name of its control.
+fn page() -> Page<&'static str> {
+    let choosable = |name: &str, open| Choosable { name: name.into(), hint: "why".into(), open };
+    let amount = Amount { name: "flap, mm".into(), value: 10.0, range: [0.0, 90.0], step: 1.0 };
+    let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
+    let picture = Picture {
+        name: "head".into(),
+        image: (1, image),
+        height: 200.0,
+        letters: vec![([0.1, 0.5], "R".into())],
+        clicked: Some(|_| "clicked"),
+        dragged: None,
+    };
+    let many = (0..30).map(|n| Item::button(format!("case {n}"), "a case", "case")).collect();
+    Page {
+        title: "Title".into(),
+        columns: vec![
+            many,
+            vec![
+                Item::Choice(
+                    "Device".into(),
+                    vec![choosable("mouse", true), choosable("haply", false)],
+                    1,
+                    |_| "device",
+                ),
+                Item::Field("Name".into(), String::new(), "nobody".into(), |_| "name"),
+                Item::Amount(amount, |_| "flap"),
+                Item::Curve("curve".into(), vec![1.0, 3.0, 2.0]),
+            ],
+            vec![
+                Item::Picture(picture),
+                Item::Alert("careful".into()),
+                Item::Table(vec![vec!["a".into(), "b".into()]]),
+            ],
+        ],
+        foot: vec![Item::main("Start", "begins", "start"), Item::closed("Check", "open a CT first")],
+        escape: Some("back"),
+        ..Page::default()
+    }
+}
+
+/// A page in a window of some size: its harness gathers the actions.
+fn shown(size: [f32; 2], scale: f32) -> Harness<'static, Vec<&'static str>> {
+    let mut textures = page::Textures::default();
+    let show = move |ui: &mut egui::Ui, done: &mut Vec<&'static str>| {
+        let drawn = egui::CentralPanel::default().show(ui, |ui| page::show(ui, &page(), &mut textures));
+        done.extend(drawn.inner);
+    };
+    let size = egui::vec2(size[0], size[1]) / scale;
+    let mut harness = Harness::builder().with_size(size).with_pixels_per_point(scale).build_ui_state(show, Vec::new());
+    harness.run_steps(3);
+    harness
+}
+
+#[test]
+fn the_controls_of_a_page_do_what_they_say_and_closed_ones_nothing() {
+    let mut harness = shown([1280.0, 800.0], 1.0);
+    for name in ["Start", "Check", "mouse", "haply", "case 3"] {
+        harness.get_by_label(name).click();
+        harness.run_steps(2);
+    }
+    assert_eq!(*harness.state(), ["start", "device", "case"]);
+    harness.key_press(Key::Escape);
+    harness.run_steps(2);
+    assert_eq!(harness.state().last(), Some(&"back"));
+}
+
+#[test]
+fn no_control_of_a_page_is_cut_off_beside_the_window() {
+    for (size, scale) in
+        [([1024.0, 700.0], 1.0), ([1280.0, 800.0], 1.0), ([1920.0, 1080.0], 1.0), ([1280.0, 800.0], 2.0)]
+    {
+        let harness = shown(size, scale);
+        let width = size[0] / scale;
+        for name in ["case 0", "case 29", "mouse", "haply", "Start", "Check", "careful"] {
+            let area = harness.get_by_label(name).rect();
+            assert!(area.left() >= 0.0 && area.right() <= width, "{name} at {size:?} and scale {scale}: {area}");
+        }
+        let foot = harness.get_by_label("Start").rect();
+        assert!(foot.bottom() <= size[1] / scale, "the foot stays in view: {foot}");
     }
 }
