@@ -184,6 +184,8 @@ impl<H: Host> Pages<H> {
         }
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         dropped.into_iter().map(|file| file.path().to_path_buf()).for_each(|path| host.dropped(path));
+        // Pages are drawn for dark rooms, whatever the session's theme is.
+        let theme = std::mem::replace(ui.visuals_mut(), egui::Visuals::dark());
         let actions = match host.shown(guest.is_some()) {
             Shown::Page(page) => {
                 guest.take().into_iter().for_each(Guest::leave);
@@ -198,6 +200,7 @@ impl<H: Host> Pages<H> {
                     let panel = egui::Panel::top("strip").resizable(false).max_size(260.0);
                     panel.show(ui, |ui| page::show(ui, &page, &mut self.textures)).inner
                 });
+                *ui.visuals_mut() = theme;
                 if let Some(mut shown) = guest.take() {
                     shown.window.show(ui, state);
                     if shown.window.is_over() { shown.leave() } else { *guest = Some(shown) }
