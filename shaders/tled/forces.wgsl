@@ -1,10 +1,11 @@
 // Forces of the elements of one law on their four nodes, each to its own slot.
 //   P = F S + (q + κ (J̄ - 1 - p)) C    f_a = -V P ∇N_a
-//   p = w² (1 + 4 w²)                  w = (0.3 - J)/0.3 between 0 and 1
+//   p = w² (1 + 16 w²)                 w = (0.7 - J)/0.7 between 0 and 1
 // J̄ = J, or the mean of the corners' node groups with averaged pressure. The slot of corner 0 also
 // carries the growth of the element's ω² since rest, negative where J ≤ 0.
-// Part b of p = w² (1 + b w²), as in the processor's law.
-const STEEPENING = 4.0;
+// Part b of p = w² (1 + b w²), and where it begins, as in the processor's law.
+const STEEPENING = 16.0;
+const RESIST_BELOW = 0.7;
 
 struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
@@ -31,9 +32,9 @@ fn continued(d: Deformation, at: f32, n: f32) -> vec2f {
 
 // Pressure p that resists inversion, and its slope against -J.
 fn resistance(d: Deformation) -> vec2f {
-    let w = min((d.clamped - d.j) * (1.0 / 0.3), 1.0);
+    let w = clamp((RESIST_BELOW - d.j) * (1.0 / RESIST_BELOW), 0.0, 1.0);
     let steep = STEEPENING * w * w;
-    return vec2f(w * w * (1.0 + steep), w * (2.0 + 4.0 * steep) * (1.0 / 0.3));
+    return vec2f(w * w * (1.0 + steep), w * (2.0 + 4.0 * steep) * (1.0 / RESIST_BELOW));
 }
 
 // A bound of the largest eigenvalue of CᵀC.

@@ -11,13 +11,13 @@
 //! ```
 //! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3;
 //! Q is the power of cofᵀF cof F in `stiffening.rs` of `trepan-soft`, ⨯ the cross product of
-//! symmetric matrices; `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1.
+//! symmetric matrices; `p = w² (1 + 16 w²)` resists inversion, `w = (0.7 - J)/0.7` between 0 and 1.
 //! Its reasons stand in `trepan_soft::Law`, the f64 version of this file.
 
 use crate::principal::{Symmetric, principal};
 use crate::symmetric::{cross, gram, scale, square, trace, trace_of_product};
 use trepan_soft::simd::{Lane, squared};
-use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
+use trepan_soft::{LEAST_STRETCH, Law, RESIST_BELOW, STEEPENING};
 
 /// Deformation of an element as the laws need it.
 #[derive(Clone, Copy)]
@@ -81,10 +81,11 @@ impl<L: Lane> Deformation<L> {
         (at + slope * (self.j - self.clamped), slope)
     }
 
-    /// How short of the volume ratio 0.3 the element is, as a share of it, up to 1.
+    /// How short of the volume ratio 0.7 the element is, as a share of it, up to 1.
     #[inline(always)]
     fn short(&self) -> L {
-        let share = (self.clamped - self.j) * L::splat((1.0 / FADE_BELOW) as f32);
+        let short = (L::splat(RESIST_BELOW as f32) - self.j).at_least(0.0);
+        let share = short * L::splat((1.0 / RESIST_BELOW) as f32);
         share - (share - L::splat(1.0)).at_least(0.0)
     }
 
@@ -94,7 +95,7 @@ impl<L: Lane> Deformation<L> {
         let short = self.short();
         let squared = short * short;
         let steep = L::splat(STEEPENING as f32) * squared;
-        let slope = short * (L::splat(2.0) + L::splat(4.0) * steep) * L::splat((1.0 / FADE_BELOW) as f32);
+        let slope = short * (L::splat(2.0) + L::splat(4.0) * steep) * L::splat((1.0 / RESIST_BELOW) as f32);
         (squared * (L::splat(1.0) + steep), slope)
     }
 

@@ -86,6 +86,8 @@ fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
         .metric("solver_steps", ride.steps as f64)
         .metric("memory_mb", ride.memory_mb)
         .metric("opened", f64::from(u8::from(ride.opened())))
+        .metric("solver_faults", ride.solver_faults())
+        .metric("truth_solver_faults", truth.solver_faults())
         .metric("truth_cpu_s_per_s", truth.cpu_s.iter().sum::<f64>() / truth.seconds))
 }
 
@@ -126,6 +128,8 @@ fn gates(rows: &[Row], gates: &mut Vec<Gate>) {
     for row in presets().chain([auto]) {
         gates.push(Gate::at_least(format!("{}: the skull is opened", row.method), number(row, "opened"), 1.0));
     }
+    let faults = number(auto, "truth_solver_faults");
+    gates.push(Gate::at_most("truth: nodes limited, elements inverted and ms skipped", faults, 0.0));
     let force = number(auto, "drilling_force_error_p95_n");
     let normal = number(auto, "bone_normal_error_p95_deg");
     gates.push(Gate::at_most("auto: force while drilling, error against the truth, p95, N", force, 0.05));
@@ -160,6 +164,7 @@ mod tests {
         assert_eq!(worst([1.0, 3.0, 2.0]), 3.0);
         let row = |name: &str, tissue: f64| {
             let row = Row::new(SCENE, name).metric("opened", 1.0).metric("cpu_s_per_s", 0.5);
+            let row = row.metric("truth_solver_faults", 0.0);
             let row = row.metric("drilling_force_error_p95_n", 0.04).metric("bone_normal_error_p95_deg", 1.0);
             let row = row
                 .metric("error_over_tolerance", 0.9)

@@ -11,11 +11,13 @@ pub struct Candidate {
     pub flags: &'static str,
 }
 
-/// The finest run: voxels and tetrahedra that nothing is held against.
+/// The finest run: voxels and tetrahedra that nothing is held against. It adds mass to elements
+/// that stiffen as every session does: without, its steps would take more substeps than a call may,
+/// and time would be skipped.
 pub fn truth(scope: Scope) -> Candidate {
     let flags = scope.pick(
-        "--quality fine --spacing-mm 0.5 --tets 25000 --opening-refinement 4 --set dynamic-mass-scaling=1",
-        "--quality fine --spacing-mm 0.4 --tets 50000 --opening-refinement 4 --set dynamic-mass-scaling=1",
+        "--quality fine --spacing-mm 0.5 --tets 25000 --opening-refinement 4",
+        "--quality fine --spacing-mm 0.4 --tets 50000 --opening-refinement 4",
     );
     Candidate { name: "truth", flags }
 }

@@ -58,6 +58,13 @@ pub struct Ride {
 }
 
 impl Ride {
+    /// Nodes limited or reset, elements inverted and milliseconds skipped, summed: over 0, the
+    /// brain's motion is not the law's.
+    pub fn solver_faults(&self) -> f64 {
+        let SolverFaults { inverted, limited, non_finite, skipped_ms, .. } = self.faults;
+        (inverted + limited + non_finite) as f64 + skipped_ms
+    }
+
     /// Whether the probe came into the hand: only when the bone is open.
     pub fn opened(&self) -> bool {
         self.probing.iter().any(|&probing| probing)
