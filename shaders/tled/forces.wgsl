@@ -1,11 +1,8 @@
 // Forces of the elements of one law on their four nodes, each to its own slot.
 //   P = F S + (q + κ (J̄ - 1 - p)) C    f_a = -V P ∇N_a
-//   p = w² (1 + 16 w²)                 w = (0.7 - J)/0.7 between 0 and 1
+//   p = w² (1 + b w²)                  w = (J₁ - J)/J₁ between 0 and 1
 // J̄ = J, or the mean of the corners' node groups with averaged pressure. The slot of corner 0 also
 // carries the growth of the element's ω² since rest, negative where J ≤ 0.
-// Part b of p = w² (1 + b w²), and where it begins, as in the processor's law.
-const STEEPENING = 16.0;
-const RESIST_BELOW = 0.7;
 
 struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;

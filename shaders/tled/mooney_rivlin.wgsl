@@ -1,5 +1,8 @@
 // Mooney-Rivlin, constants c₁₀ V, c₀₁ V, κ V, with g = J^(-2/3), h = J^(-4/3):
 //   s = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF    q = c₁₀ g' I₁ + c₀₁ h' I₂
+// J₁ and b of the pressure against inversion, as in the processor's law.
+const RESIST_BELOW = 0.3;
+const STEEPENING = 4.0;
 const ROUND = false;
 fn more_of(e: u32) -> vec4f { return more[e]; }
 fn moduli(c: array<f32, 5>) -> vec2f { return vec2f(2.0 * (c[0] + c[1]), c[2]); }

@@ -1,4 +1,7 @@
 // Neo-Hookean, constants μ V, κ V:  s = μ g I,  q = μ/2 g' I₁,  g = J^(-2/3)
+// J₁ and b of the pressure against inversion, as in the processor's law.
+const RESIST_BELOW = 0.3;
+const STEEPENING = 4.0;
 const ROUND = true;
 fn more_of(e: u32) -> vec4f { return vec4f(0.0); }
 fn moduli(c: array<f32, 5>) -> vec2f { return vec2f(c[0], c[1]); }

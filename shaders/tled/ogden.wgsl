@@ -1,6 +1,9 @@
 // Ogden, constants m₁, α₁, m₂, α₂ and κ V, with m = 2 μ V/α² and the principal stretches λ_i along
 // n_i: s = Σ_i s_i n_i n_iᵀ,  s_i = Σ_p 2 m g_p ∂(λ_i^α)/∂(λ_i²)    q = Σ_p m g_p' Σ_i λ_i^α
 // g_p = J^(-α/3) Logarithm, power and axes as in the processor's lane.rs and principal.rs.
+// J₁ and b of the pressure against inversion, as in the processor's law.
+const RESIST_BELOW = 0.3;
+const STEEPENING = 4.0;
 const ROUND = false;
 fn more_of(e: u32) -> vec4f { return more[e]; }
 fn moduli(c: array<f32, 5>) -> vec2f {

@@ -1,4 +1,7 @@
 // St. Venant-Kirchhoff, constants λ V, μ V:  s = (λ tr E - μ) I + μ FᵀF,  q = 0, no κ term
+// J₁ and b of the pressure against inversion, as in the processor's law.
+const RESIST_BELOW = 0.3;
+const STEEPENING = 4.0;
 const ROUND = false;
 fn more_of(e: u32) -> vec4f { return vec4f(0.0); }
 fn moduli(c: array<f32, 5>) -> vec2f { return vec2f(c[0] + c[1], 0.0); }

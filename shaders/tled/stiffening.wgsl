@@ -1,5 +1,8 @@
 // Stiffening with strain, constants s μ V, A V, ε and κ V, with Q = A (t w)^(1/16)/w N¹⁶,
 // N = h cofᵀF cof F / t:  s = s μ g I + 2 h Q ⨯ FᵀF    q = s μ/2 g' I₁ + h' tr(Q cofᵀF cof F)
+// J₁ and b of the pressure against inversion, as in the processor's law.
+const RESIST_BELOW = 0.7;
+const STEEPENING = 16.0;
 const ROUND = false;
 fn more_of(e: u32) -> vec4f { return more[e]; }
 fn moduli(c: array<f32, 5>) -> vec2f { return vec2f(c[0] + 34.0 * c[1], c[3]); }

@@ -50,7 +50,7 @@ pub use bound::{
     power_bound_of_ms,
 };
 pub use contact::{FreeNode, Gain, ImplicitSprings};
-pub use energy::{FADE_BELOW, NeoHookean, RESIST_BELOW, STEEPENING};
+pub use energy::{FADE_BELOW, NeoHookean, VolumeWall};
 pub use fluid::{Anchor, Fluid, LEVEL_BAND_MM};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};

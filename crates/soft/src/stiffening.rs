@@ -26,7 +26,7 @@
 //! Ogden's law, but not from a twentieth, from which a neo-Hookean one does
 //! (`cargo test -p trepan-tled --test materials`).
 
-use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power};
+use crate::energy::{NeoHookean, VolumeWall, cofactor, cofactor_change, dot, power, volumetric};
 use glam::DMat3;
 
 /// Exponent n - 1 of B in the stress; the principal stretches have -2 n.
@@ -59,8 +59,9 @@ impl Stiffening {
         (1.0 - self.share) * self.mu / f64::from(2 * STIFFENING_POWER + 2)
     }
 
+    /// Its part without stiffening and without resistance to a change of volume.
     fn round(&self) -> NeoHookean {
-        NeoHookean { mu: self.share * self.mu, kappa: self.kappa }
+        NeoHookean { mu: self.share * self.mu, kappa: 0.0 }
     }
 
     fn powers(&self, b: DMat3) -> Powers {
@@ -83,7 +84,9 @@ impl Stiffening {
         let order = f64::from(STIFFENING_POWER);
         // v^q - 1 without loss near v = 1.
         let grown = (((order + 1.0) * t.ln() + w.ln()) / order).exp_m1();
-        self.coefficient() * order / ((order + 1.0) * self.bound) * grown + self.round().energy(f)
+        self.coefficient() * order / ((order + 1.0) * self.bound) * grown
+            + self.round().energy(f)
+            + self.kappa * volumetric(f.determinant(), VolumeWall::STIFFENING)[0]
     }
 
     /// First Piola-Kirchhoff stress P, MPa.
@@ -92,7 +95,8 @@ impl Stiffening {
         let (gram, [h, dh, _]) = (c.transpose() * c, power(f.determinant(), -4.0 / 3.0));
         let powers = self.powers(gram * h);
         let q = powers.n[4] * self.factor(&powers);
-        cofactor_change(f, c * q * (2.0 * h)) + c * (dh * dot(q, gram)) + self.round().stress(f)
+        let pressure = self.kappa * volumetric(f.determinant(), VolumeWall::STIFFENING)[1];
+        cofactor_change(f, c * q * (2.0 * h)) + c * (dh * dot(q, gram) + pressure) + self.round().stress(f)
     }
 
     /// The change of the stress, `∂P/∂F : dF`, for a change `df`, MPa.
@@ -110,8 +114,9 @@ impl Stiffening {
         let dq = change * factor - q * (share * dw / powers.w);
         let through = c * q * (2.0 * h);
         let dthrough = c * q * (2.0 * dh * dj) + (dc * q + c * dq) * (2.0 * h);
-        let along = dh * dot(q, gram);
-        let dalong = ddh * dj * dot(q, gram) + dh * (dot(dq, gram) + dot(q, dgram));
+        let [_, pressure, dpressure] = volumetric(f.determinant(), VolumeWall::STIFFENING);
+        let along = dh * dot(q, gram) + self.kappa * pressure;
+        let dalong = (ddh * dot(q, gram) + self.kappa * dpressure) * dj + dh * (dot(dq, gram) + dot(q, dgram));
         cofactor_change(df, through)
             + cofactor_change(f, dthrough)
             + dc * along

@@ -183,11 +183,11 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
                 let d = if A { self.strains[i].deformation::<L>(part) } else { block.deformation::<L>(part, self.u) };
                 let mut stress = M::stress(&constants, &d);
-                let (own, (resistance, _)) = (d.j - L::splat(1.0), d.resistance());
+                let (own, (resistance, slope)) = (d.j - L::splat(1.0), d.resistance(M::WALL));
                 let volume_change = if A { L::mean(self.averages, corners) } else { own } - resistance;
                 let moduli = M::moduli(&constants);
-                let gained =
-                    stiffness(&stress, moduli, &d, volume_change) - stiffness_at_rest(M::at_rest(&constants), moduli);
+                let gained = stiffness(&stress, moduli, &d, (volume_change, slope))
+                    - stiffness_at_rest(M::at_rest(&constants), moduli);
                 let mut grown = L::load(&block.omega2, part) * gained;
                 if (L::splat(self.dynamic.limit) - grown).not_positive() > 0 {
                     grown =

@@ -117,7 +117,7 @@ mod tests {
         let constants = M::constants(law, shape.volume_mm3).map(L::splat);
         let d = deformation(&edges.map(|e| e.map(L::splat)), &gradients);
         let mut stress = M::stress(&constants, &d);
-        stress.q = stress.q + M::moduli(&constants).1 * (d.j - L::splat(1.0) - d.resistance().0);
+        stress.q = stress.q + M::moduli(&constants).1 * (d.j - L::splat(1.0) - d.resistance(M::WALL).0);
         forces(&stress, M::ROUND, &d, &gradients)
     }
 

@@ -11,13 +11,14 @@
 //! ```
 //! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3;
 //! Q is the power of cofᵀF cof F in `stiffening.rs` of `trepan-soft`, ⨯ the cross product of
-//! symmetric matrices; `p = w² (1 + 16 w²)` resists inversion, `w = (0.7 - J)/0.7` between 0 and 1.
+//! symmetric matrices; `p = w² (1 + b w²)` resists inversion, `w = (J₁ - J)/J₁` between 0 and 1
+//! ([`VolumeWall`]).
 //! Its reasons stand in `trepan_soft::Law`, the f64 version of this file.
 
 use crate::principal::{Symmetric, principal};
 use crate::symmetric::{cross, gram, scale, square, trace, trace_of_product};
 use trepan_soft::simd::{Lane, squared};
-use trepan_soft::{LEAST_STRETCH, Law, RESIST_BELOW, STEEPENING};
+use trepan_soft::{LEAST_STRETCH, Law, VolumeWall};
 
 /// Deformation of an element as the laws need it.
 #[derive(Clone, Copy)]
@@ -64,6 +65,8 @@ pub(crate) trait Constitutive<const K: usize> {
     }
     /// Whether s is a multiple of the unit tensor, so that its other entries can be skipped.
     const ROUND: bool = false;
+    /// What keeps elements from inversion.
+    const WALL: VolumeWall = VolumeWall::USUAL;
 }
 
 pub(crate) struct NeoHookean;
@@ -81,21 +84,20 @@ impl<L: Lane> Deformation<L> {
         (at + slope * (self.j - self.clamped), slope)
     }
 
-    /// How short of the volume ratio 0.7 the element is, as a share of it, up to 1.
+    /// How short of a volume ratio the element is, as a share of it, up to 1.
     #[inline(always)]
-    fn short(&self) -> L {
-        let short = (L::splat(RESIST_BELOW as f32) - self.j).at_least(0.0);
-        let share = short * L::splat((1.0 / RESIST_BELOW) as f32);
+    fn short(&self, of: f64) -> L {
+        let share = (L::splat(of as f32) - self.j).at_least(0.0) * L::splat((1.0 / of) as f32);
         share - (share - L::splat(1.0)).at_least(0.0)
     }
 
     /// Pressure that resists inversion, as a multiple of κ, and its slope against -J.
     #[inline(always)]
-    pub fn resistance(&self) -> (L, L) {
-        let short = self.short();
+    pub fn resistance(&self, wall: VolumeWall) -> (L, L) {
+        let short = self.short(wall.below);
         let squared = short * short;
-        let steep = L::splat(STEEPENING as f32) * squared;
-        let slope = short * (L::splat(2.0) + L::splat(4.0) * steep) * L::splat((1.0 / RESIST_BELOW) as f32);
+        let steep = L::splat(wall.steepening as f32) * squared;
+        let slope = short * (L::splat(2.0) + L::splat(4.0) * steep) * L::splat((1.0 / wall.below) as f32);
         (squared * (L::splat(1.0) + steep), slope)
     }
 
@@ -230,6 +232,8 @@ impl Constitutive<5> for Ogden {
 }
 
 impl Constitutive<4> for Stiffening {
+    const WALL: VolumeWall = VolumeWall::STIFFENING;
+
     fn constants(law: &Law, volume_mm3: f64) -> [f32; 4] {
         let Law::Stiffening(law) = *law else { return [0.0; 4] };
         let moduli = [law.share * law.mu, law.coefficient(), law.kappa].map(|c| (c * volume_mm3) as f32);

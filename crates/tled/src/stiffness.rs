@@ -16,17 +16,22 @@
 use crate::law::{Deformation, Stress};
 use trepan_soft::simd::{Lane, dot, squared};
 
-/// The bound A times rest volume, from the isochoric stress and (μ V, κ V).
+/// The bound A times rest volume, from the isochoric stress, (μ V, κ V), and `J̄ - 1 - p` with the
+/// slope of p against -J.
 #[inline(always)]
-pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &Deformation<L>, volume_change: L) -> L {
+pub(crate) fn stiffness<L: Lane>(
+    stress: &Stress<L>,
+    (mu, kappa): (L, L),
+    d: &Deformation<L>,
+    (volume_change, slope): (L, L),
+) -> L {
     let [xx, yy, zz, xy, xz, yz] = stress.s;
     let off = magnitude(xy) + magnitude(xz) + magnitude(yz);
     let itself = magnitude(xx) + magnitude(yy) + magnitude(zz) + off + off;
     let inverse = d.root * d.root * d.root;
     let power = inverse * inverse * d.root * d.root;
     let i1 = squared(&d.f);
-    let resistance = kappa * d.resistance().1;
-    let volume = kappa + resistance + L::splat(5.0 / 9.0) * mu * i1 * power;
+    let volume = kappa * (L::splat(1.0) + slope) + L::splat(5.0 / 9.0) * mu * i1 * power;
     let turning = magnitude(stress.q + kappa * volume_change) * i1.sqrt();
     itself + stress.stiffening + volume * largest_eigenvalue(&d.c) + turning
 }
@@ -70,7 +75,7 @@ mod tests {
         let constants = M::constants(&law, 1.0);
         let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
         let moduli = M::moduli(&constants);
-        let general = stiffness(&M::stress(&constants, &rest), moduli, &rest, 0.0);
+        let general = stiffness(&M::stress(&constants, &rest), moduli, &rest, (0.0, 0.0));
         [general, stiffness_at_rest(M::at_rest(&constants), moduli)]
     }
 
@@ -90,7 +95,8 @@ mod tests {
 
     fn bound<M: Constitutive<K>, const K: usize>(law: &Law, d: &Deformation<f32>) -> f32 {
         let constants = M::constants(law, 1.0);
-        stiffness(&M::stress(&constants, d), M::moduli(&constants), d, d.j - 1.0 - d.resistance().0)
+        let (resistance, slope) = d.resistance(M::WALL);
+        stiffness(&M::stress(&constants, d), M::moduli(&constants), d, (d.j - 1.0 - resistance, slope))
     }
 
     proptest! {
