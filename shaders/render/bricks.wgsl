@@ -115,8 +115,9 @@ fn enter_drilled(c: Corners, cell: vec3i, a: vec3f, b: vec3f, begin: f32) -> f32
     return 2.0;
 }
 
-// Height over the CT's surface at which shadow rays start, voxels.
-const LIFT_VOXEL: f32 = 0.8;
+// Height over the CT's surface at which shadow rays start, voxels: 0.8 mm or voxels, whichever is
+// more. Over the steps that thick slices leave.
+fn lift() -> f32 { return 0.8 * max(1.0, 1.0 / scene.origin.w); }
 
 // Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or
 // NOTHING. Three loops, each cheap, instead of branches: drivers that run pixels in lockstep skip

@@ -104,7 +104,7 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, rest: vec3f) -> vec3f {
     var open = 1.0;
     if scene.forward.w > 0.0 {
         open = openness(g, normal);
-        key *= select(1.0, 0.25, shadowed(g, normal, LIFT_VOXEL));
+        key *= select(1.0, 0.25, shadowed(g, normal, lift()));
     }
     return lit(painted_brain(brain_colour(rest - 3.5 * normal), rest), normal, along, open, key, 0.20);
 }

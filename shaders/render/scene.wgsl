@@ -13,12 +13,12 @@ struct Scene {
     tip: vec4f,               // centre of the tool's ball; w: its radius (negative: no tool)
     tail: vec4f,              // far end of the shaft; w: its radius
     light: vec4f,             // unit, towards the light; w: 1 while drilling
-    spin: vec4f,              // unit, across the shaft: turns with the burr
+    spin: vec4f,              // unit, across the shaft: turns with the burr; w: share of a sample in the mean
     second_tip: vec4f,        // the tool in the other hand, as `tip`
     second_tail: vec4f,       // as `tail`
     brain_cut: vec4f,         // unit normal and offset of the plane over which the brain is cut away; zeroes: none
     bone_cut: vec4f,          // the same for bone
-    tips: vec4f,              // how the tools' tips look, first and second: 1 fluted, 2 the mouth of a tube, 0 smooth; z: steps of the cut's lattice a voxel
+    tips: vec4f,              // how the tools' tips look, first and second: 1 fluted, 2 the mouth of a tube, 0 smooth; z: steps of the cut's lattice a voxel; w: voxels from one point of the smoothed CT to the next
     bone_paint: array<vec4f, 2>,    // lower corner of the colours over bone (w: 1 if there are any), one over the box's size
     brain_paint: array<vec4f, 2>,   // the same over the brain at rest
 }

@@ -18,6 +18,8 @@ pub const RENDER_SKULL: &str = picture!("drilled.wgsl", "bricks.wgsl", "skull.wg
 pub const RENDER_BRAIN: &str = picture!("brain.wgsl");
 /// Lighting of bone, brain and tool, with the shadows of bone on the brain.
 pub const RENDER_LIGHT: &str = picture!("drilled.wgsl", "bricks.wgsl", "tool.wgsl", "light.wgsl");
+/// Mean of samples of the 3-D view.
+pub const RENDER_AVERAGE: &str = picture!("average.wgsl");
 /// Arrow, ghost and markers over the 3-D view.
 pub const RENDER_OVERLAY: &str = picture!("tool.wgsl", "overlay.wgsl");
 /// The cut surface of the brain.

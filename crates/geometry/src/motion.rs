@@ -56,6 +56,9 @@ impl Buttons {
     /// A teacher's pause: no force, and other buttons are ignored.
     pub const PAUSE: Self = Self(16);
 
+    /// Requests a redo of the stroke that was undone last.
+    pub const REDO: Self = Self(32);
+
     /// Requests a tool of a kind; with one in the hand, the next of that kind.
     pub fn take(kind: ToolKind) -> Self {
         Self((kind as u32 + 1) << 8)

@@ -13,6 +13,8 @@ pub enum Format {
     Rgba8Unorm,
     /// Half precision, filterable everywhere.
     R16Float,
+    /// Colour in half precision: filterable, and passes can blend into it.
+    Rgba16Float,
     /// Four integers, or the bits of four single-precision numbers; load only. Every driver can
     /// render to it.
     Rgba32Uint,
@@ -52,6 +54,7 @@ impl Format {
             Self::R8Uint => wgpu::TextureFormat::R8Uint,
             Self::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
             Self::R16Float => wgpu::TextureFormat::R16Float,
+            Self::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
             Self::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
             Self::Depth32Float => wgpu::TextureFormat::Depth32Float,
         }
@@ -63,6 +66,7 @@ impl Format {
             Self::R8Unorm | Self::R8Uint => 1,
             Self::R16Float => 2,
             Self::Rgba8Unorm | Self::Depth32Float => 4,
+            Self::Rgba16Float => 8,
             Self::Rgba32Uint => 16,
         }
     }

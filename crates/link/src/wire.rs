@@ -75,6 +75,8 @@ impl TickRecord {
     pub const THROUGH: u32 = 1 << 7;
     /// [`tissue_force`](Self::tissue_force) is set; not in older recordings.
     pub const TISSUE: u32 = 1 << 8;
+    /// A stroke was being undone or redone.
+    pub const UNDOING: u32 = 1 << 9;
 
     /// Whether every flag of `mask` is set.
     pub fn has(&self, mask: u32) -> bool {

@@ -24,6 +24,9 @@ pub(crate) const NOTHING: f32 = 1e30;
 /// Edge of a block whose bone fraction is stored for ambient light, in voxels.
 pub(crate) const BLOCK: usize = 4;
 
+/// A numerical parameter: largest distance between points of the smoothed CT, mm; at least a voxel.
+const SMOOTH_STEP_MM: f32 = 1.0;
+
 /// The padded grid of a bone volume.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grid {
@@ -37,6 +40,8 @@ pub(crate) struct Grid {
     pub isovalue: i16,
     /// Steps of the cut's lattice along a voxel's edge.
     pub steps: usize,
+    /// Voxels from one point of the smoothed CT's lattice to the next.
+    pub smooth_step: usize,
 }
 
 /// Free distances from each brick.
@@ -67,7 +72,14 @@ impl Grid {
     /// The grid of a bone volume; without bone, eight voxels of air.
     pub fn of(bone: Option<&BoneVolume>) -> Self {
         let Some(bone) = bone else {
-            return Self { dims: [2; 3], origin: Vec3::ZERO, spacing_mm: 1.0, isovalue: i16::MAX, steps: 1 };
+            return Self {
+                dims: [2; 3],
+                origin: Vec3::ZERO,
+                spacing_mm: 1.0,
+                isovalue: i16::MAX,
+                steps: 1,
+                smooth_step: 1,
+            };
         };
         Self {
             dims: bone.dims().map(|n| n + 2),
@@ -75,6 +87,7 @@ impl Grid {
             spacing_mm: bone.spacing_mm(),
             isovalue: bone.isovalue(),
             steps: 2 * bone.cut_nodes() as usize,
+            smooth_step: ((SMOOTH_STEP_MM / bone.spacing_mm() + 1e-3) as usize).max(1),
         }
     }
 

@@ -46,6 +46,7 @@ mod report;
 mod scene;
 mod section;
 mod slice;
+mod smooth;
 mod stereo;
 mod tool;
 #[cfg(feature = "window")]

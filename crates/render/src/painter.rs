@@ -114,6 +114,31 @@ impl Painter {
         self.picture(frame)
     }
 
+    /// Smooths the edges of the last picture, of the same frame, by one more sample of a pixel;
+    /// returns whether there was one to add.
+    pub fn refine(&mut self, frame: &Frame) -> Result<bool, RenderError> {
+        match &mut self.by {
+            By::Processor(processor) => Ok(processor.refine(frame)),
+            By::Device(renderer) => renderer.refine(frame),
+        }
+    }
+
+    /// The last picture, as it is now.
+    pub fn image(&self) -> Result<Image, RenderError> {
+        match &self.by {
+            By::Processor(processor) => Ok(processor.image().enlarged(self.quality.size)),
+            By::Device(renderer) => renderer.image(),
+        }
+    }
+
+    /// Whether bone has changed since the last picture.
+    pub fn is_stale(&mut self) -> bool {
+        match &mut self.by {
+            By::Device(renderer) => renderer.is_stale(),
+            By::Processor(processor) => processor.is_stale(),
+        }
+    }
+
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         self.quality.size = size;
@@ -124,17 +149,16 @@ impl Painter {
     }
 
     /// Adapts the pictures to an area of `size` pixels, with a fraction `detail` of the pixels
-    /// along an edge. Below 1, a device draws the 3-D view with fewer pixels; the processor casts
-    /// every second ray where bone is smooth, and under 1/2 draws smaller pictures.
+    /// along an edge. Below 1, a device draws the 3-D view with fewer pixels; the processor draws
+    /// smaller pictures, and casts every second ray where bone is smooth.
     pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
         match &mut self.by {
             By::Device(renderer) => renderer.set_detail(detail).and_then(|()| renderer.resize(size)),
             By::Processor(processor) => {
                 let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
                 processor.set_casting(Casting { sparse: detail < 1.0, ..processor.casting() });
-                let share = (2.0 * detail).min(1.0);
                 // A window enlarges the picture itself.
-                self.quality = Quality::full(Quality { detail: share, ..Quality::full(size) }.drawn());
+                self.quality = Quality::full(Quality { detail, ..Quality::full(size) }.drawn());
                 processor.resize(self.quality.size)
             }
         }

@@ -59,7 +59,7 @@ impl Scene {
             second_tail,
             brain_cut: Cut::plane(frame.cut.as_ref()),
             bone_cut: Cut::plane(frame.cut.as_ref().filter(|cut| cut.bone)),
-            tips: Vec4::new(look(tool.kind), look(second.kind), grid.steps as f32, 0.0),
+            tips: Vec4::new(look(tool.kind), look(second.kind), grid.steps as f32, grid.smooth_step as f32),
             bone_paint: Paint::placed(frame.bone_paint),
             brain_paint: Paint::placed(frame.brain_paint),
             light: towards_light(view).extend(flag(frame.drilling)),

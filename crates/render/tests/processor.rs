@@ -12,7 +12,10 @@ use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Faults, GpuError};
 use trepan_mesh::TetMesh;
-use trepan_render::{Camera, Casting, Frame, Image, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook};
+use trepan_render::{
+    Camera, Casting, Frame, Image, Overlay, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo,
+    StereoLook,
+};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// A shell with a hole that shows the brain in it, and a burr at the hole.
@@ -174,7 +177,7 @@ fn without_a_device_the_processor_draws_and_says_why() {
     assert_eq!(([image.width, image.height], report.pixels_cast), ([120, 100], (120 - 33) * 100));
     painter.fit([120, 100], 0.25).expect("a quarter of the detail");
     let (image, _) = painter.picture(&frame).expect("drawn");
-    assert_eq!([image.width, image.height], [60, 50]);
+    assert_eq!([image.width, image.height], [30, 25]);
     assert!(painter.renderer().is_none() && painter.into_renderer().is_err());
 }
 
@@ -228,4 +231,69 @@ fn a_brain_and_its_mri_need_no_ct() {
     assert!(index > 0.99, "similarity {index}");
     scene::renderer(&gpu, &alone, size).draw(&frame).expect("an empty scene is drawn");
     assert_eq!(gpu.faults(), Faults::default());
+}
+
+/// The mean of 4 x 4 pixels.
+fn quartered(image: &Image) -> Image {
+    let [width, height] = [image.width / 4, image.height / 4];
+    let mean = |x: u32, y: u32, c: usize| {
+        let sum: u32 = (0..16).map(|n| u32::from(image.pixel(4 * x + n % 4, 4 * y + n / 4)[c])).sum();
+        ((sum + 8) / 16) as u8
+    };
+    let rgba = (0..width * height).flat_map(|n| [0, 1, 2, 3].map(|c| mean(n % width, n / width, c))).collect();
+    Image { width, height, rgba }
+}
+
+#[test]
+fn edges_at_rest_are_those_of_a_picture_with_sixteen_samples_a_pixel() {
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let overlay = Overlay {
+        force: Some([frame.world_from_tool.translation, Vec3::new(-18.0, 38.0, 12.0)]),
+        ..Overlay::default()
+    };
+    let frame = Frame { overlay, slices: SliceLook { shown: false, ..frame.slices }, ..frame };
+    let mut fine = ProcessorRenderer::new(&data, [640, 480]).expect("the scene loads");
+    fine.draw(&frame).expect("drawn");
+    let reference = quartered(fine.image());
+    let mut renderer = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
+    renderer.draw(&frame).expect("drawn");
+    let sharp = renderer.image().error_percent(&reference);
+    let hits = renderer.bone_hits();
+    let samples = (0..99).take_while(|_| renderer.refine(&frame)).count();
+    let smooth = renderer.image().error_percent(&reference);
+    println!("error against 16 samples: {sharp:.2} %, smoothed {smooth:.2} %");
+    assert_eq!(samples, 16);
+    assert!(smooth < 0.5 && sharp > 2.0 * smooth, "{sharp} %, smoothed {smooth} %");
+    if let Some(gpu) = device() {
+        let mut on_device = scene::renderer(&gpu, &data, [160, 120]);
+        on_device.draw(&frame).expect("drawn");
+        let samples = (0..99).take_while(|_| on_device.refine(&frame).expect("drawn")).count();
+        let smooth = on_device.image().expect("read").error_percent(&reference);
+        println!("on the device {smooth:.2} %");
+        assert!(samples == 16 && smooth < 0.5, "{samples} samples, {smooth} %");
+        on_device.draw(&frame).expect("drawn");
+        assert!(on_device.image().expect("read").error_percent(&reference) > 2.0 * smooth, "a new picture begins anew");
+    }
+    // What was smoothed is not taken for a surface.
+    assert_eq!(renderer.bone_hits(), hits);
+    let moved = Frame { camera: Camera { azimuth_rad: frame.camera.azimuth_rad + 0.1, ..frame.camera }, ..frame };
+    renderer.draw(&moved).expect("drawn");
+    renderer.draw(&frame).expect("drawn");
+    assert_eq!(renderer.image().error_percent(&reference), sharp, "a new picture begins anew");
+    let both = Frame { stereo: Some(Stereo { look: StereoLook::SideBySide, eye_distance_mm: 5.0 }), ..frame };
+    renderer.draw(&both).expect("drawn");
+    assert!(!renderer.refine(&both));
+}
+
+#[test]
+fn a_change_of_the_bone_makes_the_picture_stale_until_it_is_drawn() {
+    let (shell, _, _, frame) = head();
+    let mut renderer = ProcessorRenderer::new(&alone(&shell), [40, 30]).expect("the scene loads");
+    renderer.draw(&frame).expect("drawn");
+    assert!(!renderer.is_stale());
+    shell.set_hu(shell.voxel_of(Vec3::new(0.0, 24.0, 0.0)), AIR_HU);
+    assert!(renderer.is_stale() && renderer.is_stale());
+    renderer.draw(&frame).expect("drawn");
+    assert!(!renderer.is_stale());
 }

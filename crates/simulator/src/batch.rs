@@ -9,7 +9,7 @@
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::report::output::dated;
-use crate::session::{Ended, Session};
+use crate::session::{Ended, Place, Session};
 use crate::{Inputs, Options, Program};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -40,9 +40,9 @@ pub(crate) fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, Sess
 }
 
 /// Replays recordings one after the other; returns the number of failures.
-pub(crate) fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf]) -> usize {
-    let out = options.out.clone().unwrap_or_else(|| dated(program));
-    let failed = |file: &&PathBuf| match one(program, options, built_in, file, &out) {
+pub(crate) fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf], place: &Place) -> usize {
+    let out = options.out.clone().unwrap_or_else(|| dated(program, None, options.name.as_deref()));
+    let failed = |file: &&PathBuf| match one(program, options, built_in, file, (&out, place)) {
         Ok(line) => {
             println!("{}: {line}", printable(&file.display().to_string()));
             false
@@ -60,7 +60,7 @@ fn one(
     options: &Options,
     built_in: &Inputs,
     file: &Path,
-    out: &Path,
+    (out, place): (&Path, &Place),
 ) -> Result<String, SessionError> {
     let options = Options {
         device: Some(format!("replay:{}", file.display())),
@@ -69,7 +69,7 @@ fn one(
         record: None,
         ..options.clone()
     };
-    let Ended { summary, lack, .. } = Session::open(program, options, built_in.clone())?.run()?;
+    let Ended { summary, lack, .. } = Session::open_in(program, options, built_in.clone(), place.clone())?.run()?;
     let replay = summary.replay.unwrap_or_default();
     let text = format!("{}, {:.1} mm3 removed", replay.describe(), summary.bone_removed_mm3);
     match lack {

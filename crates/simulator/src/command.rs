@@ -5,6 +5,7 @@ use crate::batch;
 use crate::case::choice::{Built, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
 use crate::constants;
+use crate::desk::{self, Done};
 use crate::device_test;
 use crate::ingredients::table;
 use crate::models::ModelRequest;
@@ -12,7 +13,7 @@ use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
 use crate::printable::printable;
 use crate::recordings;
 use crate::report::summary::{CutOff, slow};
-use crate::session::{Ended, Session};
+use crate::session::{Ended, Place, Session};
 use crate::show::driver;
 use crate::{Inputs, Options, Program, SessionError};
 use clap::Parser;
@@ -20,6 +21,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
+use trepan_render::window::display;
 
 /// Runs a program and returns its exit code.
 ///
@@ -65,11 +67,21 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     if let Some(task) = &options.task {
         return perform(program, task, built_in);
     }
+    if !options.headless && display().is_ok() {
+        return match desk::run(program, options, built_in) {
+            None | Some(Ok(Done::Case(_))) => ExitCode::SUCCESS,
+            Some(Ok(Done::Session(ended))) => report(&ended),
+            Some(Ok(Done::Batch(counts))) => replayed(counts),
+            Some(Err(fault)) => failed(program, &fault),
+        };
+    }
+    if !options.headless {
+        tracing::info!("no display here: running the scripted operation headless");
+    }
     match batch::recordings(&options) {
         Ok(Some(files)) => {
-            let failures = batch::run(program, &options, &built_in, &files);
-            println!("{} of {} recordings replayed", files.len() - failures, files.len());
-            return if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+            let failures = batch::run(program, &options, &built_in, &files, &Place::default());
+            return replayed([failures, files.len()]);
         }
         Ok(None) => {}
         Err(fault) => return failed(program, &fault),
@@ -78,6 +90,12 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         Ok(ended) => report(&ended),
         Err(fault) => failed(program, &fault),
     }
+}
+
+/// Reports on a batch of replays: how many failed, how many there were.
+fn replayed([failures, all]: [usize; 2]) -> ExitCode {
+    println!("{} of {all} recordings replayed", all - failures);
+    if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Runs a subcommand.

@@ -9,6 +9,9 @@ pub enum SessionError {
     /// Invalid flag or combination of flags.
     #[error("{0}")]
     Usage(String),
+    /// Loading that the user cancelled.
+    #[error("loading was cancelled")]
+    Cancelled,
     /// Unreadable image.
     #[error(transparent)]
     Read(#[from] trepan_volume::ReadError),

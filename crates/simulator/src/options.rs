@@ -63,6 +63,22 @@ pub struct Options {
     /// Folder for summary, report, recording, pictures [default: trepan-out/PROGRAM/DATE-AND-TIME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Name of the session; ends the name of its folder
+    #[arg(long, value_name = "NAME", conflicts_with = "out")]
+    pub name: Option<String>,
+    /// Who operates; the report compares with earlier sessions of the same person
+    #[arg(long, value_name = "NAME")]
+    pub person: Option<String>,
+    /// Lesson with steps and pass marks: first-operation, through or flap, or the name in a file of
+    /// the user's own
+    #[arg(long, value_name = "NAME", conflicts_with = "watch")]
+    pub lesson: Option<String>,
+    /// Folder of the sessions that the start page begins
+    #[arg(skip)]
+    pub sessions: Option<PathBuf>,
+    /// Place in the tray of the tool that a session with the mouse begins with
+    #[arg(skip)]
+    pub first_slot: usize,
     /// Replace the session that --out holds, or the file that --record names
     #[arg(long)]
     pub overwrite: bool,
@@ -378,6 +394,16 @@ impl Options {
     /// Whether only the list of keys is wanted.
     pub(crate) fn lists_keys(&self) -> bool {
         self.settings.iter().any(Option::is_none)
+    }
+
+    /// Whether neither a case nor a device nor a place for files is named: a window begins with its
+    /// start page.
+    pub(crate) fn names_no_session(&self) -> bool {
+        let Patient { ct, mri, labels, tissues, .. } = &self.patient;
+        let paths = [&self.case, ct, mri, labels, &self.out, &self.record];
+        let names = [&self.device, &self.second_device, &self.share, &self.watch, &self.name, &self.lesson];
+        let none = paths.iter().all(|path| path.is_none()) && names.iter().all(|name| name.is_none());
+        none && tissues.is_empty() && self.duration.is_none()
     }
 
     /// Refuses numbers out of range; the error names flag and range.

@@ -11,7 +11,10 @@ use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
+use crate::progress::Progress;
 use crate::recordings;
+use crate::report::debrief::Debrief;
+use crate::report::kept::Kept;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{CutOff, Machine, SecondSummary, SolverSummary, Summary, fps};
@@ -29,6 +32,7 @@ use crate::show::graphics::{Graphics, NoPicture};
 use crate::show::picture::{self, Album};
 use crate::show::{player, window};
 use crate::stages::haptic_tick::ToolSample;
+use crate::training::{Guide, Lesson};
 use std::path::{Path, PathBuf};
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
@@ -37,6 +41,7 @@ use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::Camera;
+use trepan_render::window::Stage;
 use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// A session that is ready to run.
@@ -51,9 +56,20 @@ pub struct Session {
     /// Input files of the case; empty for a case folder.
     inputs: Inputs,
     out: PathBuf,
-    windowed: bool,
+    lesson: Option<Lesson>,
+    /// Where it runs.
+    place: Place,
+}
+
+/// Where a session runs: in a window, or without one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Place {
+    /// The window; `None` for a headless run.
+    pub window: Option<Stage>,
     /// Graphics device, if it was looked for already.
-    drawing: Option<Result<Gpu, GpuError>>,
+    pub drawing: Option<Result<Gpu, GpuError>>,
+    /// Progress of loading.
+    pub progress: Progress,
 }
 
 /// Result of a session.
@@ -65,6 +81,8 @@ pub struct Ended {
     pub out: PathBuf,
     /// The signal that ended it, if one did.
     pub signal: Option<i32>,
+    /// Hash of the case that it ran on.
+    pub case: Option<String>,
     /// What the replayed recording lacks, with the remedy.
     pub lack: Option<String>,
 }
@@ -74,11 +92,19 @@ impl Session {
     ///
     /// `built_in` is the case that is used if no image is given.
     pub fn open(program: Program, options: Options, built_in: Inputs) -> Result<Self, SessionError> {
+        Self::open_in(program, options, built_in, Place::default())
+    }
+
+    /// Opens a session that runs in a window, if the place has one.
+    pub(crate) fn open_in(
+        program: Program,
+        options: Options,
+        built_in: Inputs,
+        mut place: Place,
+    ) -> Result<Self, SessionError> {
         options.check()?;
-        let windowed = !options.headless && trepan_render::window::display().is_ok();
-        if !windowed && !options.headless {
-            tracing::info!("no display here: running the scripted operation headless");
-        }
+        let (lesson, options) = taught(options)?;
+        let windowed = place.window.is_some();
         check_outputs(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
@@ -88,17 +114,21 @@ impl Session {
         };
         let operation = Operation::of(&options, &device, recording.as_ref());
         let request = ModelRequest::of(program, &options, &operation, recording.as_ref())?;
-        let mut drawing = None;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
             None => choice::inputs(&options.patient, built_in.clone()),
         };
-        let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
-        let (case, models) = choice::open_case(program, &options, built_in, request, card)?;
+        let Place { drawing, progress, .. } = &mut place;
+        let card = || drawing.get_or_insert_with(driver::open).as_ref().is_ok_and(|gpu| !gpu.is_software());
+        let (case, models) = choice::open_case(program, &options, built_in, request, (progress, card))?;
+        progress.next("preparing the operation")?;
         let identity = Identity { name: case.name.clone(), case: Some(case.hash.clone()), images: case.images.clone() };
         let setup = SessionSetup::new(program, (case, models), operation, windowed && recording.is_some())?;
-        let out = options.out.clone().unwrap_or_else(|| output::dated(program));
-        Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, windowed, drawing })
+        let out = options
+            .out
+            .clone()
+            .unwrap_or_else(|| output::dated(program, options.sessions.as_deref(), options.name.as_deref()));
+        Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, lesson, place })
     }
 
     /// Runs the session and writes its files; on failure no partly written file remains.
@@ -115,16 +145,18 @@ impl Session {
         let second_limits = second.as_ref().map(|second| self.limits(second, hand::SECOND));
         let start = self.start();
         let limits_of_both = (&limits, second_limits.as_ref());
+        self.place.progress.next("preparing contact and tissue")?;
         let stages = self.setup.stages(start.state, self.tick_ms(), limits_of_both)?;
         let OpenDevice { device, pointer, watch, watching } = hand;
         let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
-        let place = output::Place::make(&self.out, &record)?;
+        let files = output::Files::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
         let recorder = Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?;
-        let drawing = self.drawing.take();
+        self.place.progress.next("preparing the picture")?;
+        let drawing = self.place.drawing.take();
         let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
@@ -160,12 +192,26 @@ impl Session {
             ..self.about(&album)
         };
         let summary = summary.with(&outcome);
-        output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
+        let debrief = self.debrief(&summary)?;
+        output::write(&self.out, &recording, &summary, &outcome, (&debrief, &self.shots(album.shots)))?;
         if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
             output::skull(&self.out, &densities, around.as_ref(), bone, self.options.stl)?;
         }
-        place.keep();
-        Ok(Ended { summary, out: self.out, signal: stop.signal(), lack })
+        files.keep();
+        Ok(Ended { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
+    }
+
+    /// The debriefing, compared with earlier sessions beside this one.
+    fn debrief(&self, summary: &Summary) -> Result<Debrief, SessionError> {
+        let summary =
+            serde_json::to_value(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
+        let roots: Vec<PathBuf> = self.out.ancestors().nth(2).map(PathBuf::from).into_iter().collect();
+        let this = Kept::with(&self.out, summary);
+        Ok(Debrief::of(&this.summary, self.lesson.as_ref(), &this.before(&Kept::list(&roots))))
+    }
+
+    fn windowed(&self) -> bool {
+        self.place.window.is_some()
     }
 
     /// Describes what the replayed recording lacks, and whether its case was built differently.
@@ -233,7 +279,7 @@ impl Session {
             hands = [taught(one, first), taught(other, second)];
             company.asked = Some(window);
         }
-        if let Some(name) = self.options.watch.as_deref().filter(|_| self.windowed) {
+        if let Some(name) = self.options.watch.as_deref().filter(|_| self.windowed()) {
             let teacher = Teacher::join(name);
             company.teacher = Some(teacher.map_err(|fault| SessionError::Usage(format!("--watch {name}: {fault}")))?);
         }
@@ -245,7 +291,7 @@ impl Session {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
-                let film = self.windowed.then(|| Filming::new(self.setup.bone().cloned(), length_ms));
+                let film = self.windowed().then(|| Filming::new(self.setup.bone().cloned(), length_ms));
                 lockstep::run(run, (recording, end_ms), film, picture)
             }
             (None, Some(devices)) => threads::run(run, devices, self.pace(), picture),
@@ -270,11 +316,11 @@ impl Session {
     }
 
     fn graphics(&self, drawing: Option<Result<Gpu, GpuError>>) -> Result<Graphics, NoPicture> {
-        if !self.windowed && self.options.frames_per_second == 0.0 {
+        if !self.windowed() && self.options.frames_per_second == 0.0 {
             return Err(NoPicture::NotRequested);
         }
         let gpu = drawing.unwrap_or_else(driver::open);
-        Ok(Graphics::open(&self.setup, self.options.picture, gpu, self.windowed)?)
+        Ok(Graphics::open(&self.setup, self.options.picture, gpu, self.windowed())?)
     }
 
     fn picture(
@@ -289,12 +335,22 @@ impl Session {
             picture::wait(eyes, stop);
             return Album::default();
         };
-        if !self.windowed {
+        let Some(stage) = &self.place.window else {
             let folder = self.out.join("frames");
             return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
-        }
+        };
         let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
-        let opened = window::Opened { table, case, out, rate_hz };
+        let progress = &self.place.progress;
+        let opened = window::Opened {
+            progress,
+            stage,
+            table,
+            case,
+            out,
+            rate_hz,
+            slot: self.options.first_slot,
+            guide: self.lesson.clone().map(Guide::new),
+        };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
                 let until_s = self.options.duration.unwrap_or(f64::INFINITY);
@@ -354,6 +410,9 @@ impl Session {
         Summary {
             app: self.program.name().into(),
             case: self.case.name.clone(),
+            person: self.options.person.clone(),
+            name: self.options.name.clone(),
+            lesson: self.lesson.as_ref().map(|lesson| lesson.name.clone()),
             device: match (self.device.recording(), &self.options.watch) {
                 (_, Some(_)) => "watch".into(),
                 (Some(_), _) => "replay".into(),
@@ -377,6 +436,17 @@ impl Session {
             ..Summary::default()
         }
     }
+}
+
+/// Finds the lesson that the options name, and takes its flap and tool.
+fn taught(options: Options) -> Result<(Option<Lesson>, Options), SessionError> {
+    let Some(name) = &options.lesson else { return Ok((None, options)) };
+    let all = Lesson::all(Lesson::folder().as_deref());
+    let names = || all.iter().map(|lesson| lesson.name.as_str()).collect::<Vec<_>>().join(", ");
+    let unknown = || SessionError::Usage(format!("--lesson {name} is not known: give one of {}", names()));
+    let lesson = all.iter().find(|lesson| lesson.name == *name).cloned().ok_or_else(unknown)?;
+    let flap = options.flap.or(Some(lesson.flap_mm));
+    Ok((Some(lesson.clone()), Options { flap, first_slot: lesson.slot, ..options }))
 }
 
 /// Device of a hand, if any.

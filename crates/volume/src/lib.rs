@@ -67,7 +67,7 @@ pub use regular::{open_regular, read_regular};
 pub use resample::{Grid, Interpolation, resample};
 pub use sample::{ByteOrder, Number, Sample};
 pub use skull::{
-    GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, is_ct, labels, skull_only,
+    GREATEST_ISOVALUE, HounsfieldError, Islands, LEAST_ISOVALUE, bone_isovalue, hounsfield, is_ct, labels, skull_only,
 };
 pub use spline::Spline;
 pub use stroke::{BRICK, MAX_STROKE_BRICKS, MAX_STROKES, Undone};

@@ -94,18 +94,49 @@ pub fn bone_isovalue(ct: &VoxelVolume<i16>) -> i16 {
     (best.1 as i16).clamp(LEAST_ISOVALUE, GREATEST_ISOVALUE)
 }
 
+/// Loose bone that was removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Islands {
+    /// Pieces.
+    pub pieces: usize,
+    /// Their volume, mm³.
+    pub mm3: f64,
+    /// Volume of the skull that stays, mm³.
+    pub skull_mm3: f64,
+}
+
+impl Islands {
+    /// A remark for the user; `None` if nothing was loose.
+    pub fn note(&self) -> Option<String> {
+        let Self { pieces, mm3, skull_mm3 } = *self;
+        (pieces > 0).then(|| {
+            format!(
+                "{pieces} loose pieces of bone were left out, {:.2} cm³ beside a skull of {:.0} cm³ (table, head rest, fragments, bone thinner than a voxel); if a part of the skull is missing, give a lower --isovalue-hu",
+                1e-3 * mm3,
+                1e-3 * skull_mm3
+            )
+        })
+    }
+}
+
 /// Keeps only the skull: voxels at or over the isovalue outside the largest piece are set to one HU
-/// under it.
-pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) {
+/// under it. Returns what was removed.
+pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) -> Islands {
     let pieces = Components::of(ct.dims, |at| ct.data[at] >= isovalue);
-    let Some(skull) = pieces.largest() else { return };
+    let Some(skull) = pieces.largest() else { return Islands::default() };
+    let [largest, _] = pieces.two_largest();
+    let voxel_mm3 = ct.spacing_mm().element_product();
+    let mut loose = 0;
     let under = isovalue.saturating_sub(1);
     let data = &mut ct.data;
     pieces.every_run(|piece, run| {
         if piece != skull {
+            loose += run.len();
             data[run].fill(under);
         }
     });
+    let mm3 = |voxels: usize| voxels as f64 * voxel_mm3;
+    Islands { pieces: pieces.count() - 1, mm3: mm3(loose), skull_mm3: mm3(largest) }
 }
 
 /// Converts a label volume's values to integers. Rejects NaN, negative and fractional values and
@@ -134,7 +165,10 @@ mod tests {
         ct.data[0..6].fill(900);
         ct.data[20..24].fill(1200);
         ct.data[12] = 40;
-        skull_only(&mut ct, 300);
+        let removed = skull_only(&mut ct, 300);
+        assert_eq!(removed, Islands { pieces: 1, mm3: 4.0, skull_mm3: 6.0 });
+        assert!(removed.note().unwrap().starts_with("1 loose pieces"), "{:?}", removed.note());
+        assert_eq!(skull_only(&mut ct, 300).note(), None);
         assert!(ct.data[0..6].iter().all(|&v| v == 900) && ct.data[20..24].iter().all(|&v| v == 299));
         assert_eq!(ct.data[12], 40);
     }

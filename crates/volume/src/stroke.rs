@@ -50,6 +50,10 @@ pub(crate) struct Strokes {
     starts: Vec<AtomicUsize>,
     oldest: AtomicUsize,
     next: AtomicUsize,
+    /// End of the copies of each stroke that was undone.
+    ends: Vec<AtomicUsize>,
+    /// Number of strokes that were undone since the last stroke began.
+    undone: AtomicUsize,
     /// Whether an older stroke was discarded.
     forgot: AtomicBool,
     /// Copies made so far, less those of undone strokes.
@@ -69,6 +73,8 @@ impl Strokes {
             starts: (0..MAX_STROKES).map(|_| AtomicUsize::new(0)).collect(),
             oldest: AtomicUsize::new(0),
             next: AtomicUsize::new(0),
+            ends: (0..MAX_STROKES).map(|_| AtomicUsize::new(0)).collect(),
+            undone: AtomicUsize::new(0),
             forgot: AtomicBool::new(false),
             copied: AtomicUsize::new(0),
             bricks: (0..room).map(|_| AtomicU32::new(0)).collect(),
@@ -76,9 +82,10 @@ impl Strokes {
         }
     }
 
-    /// Starts a new stroke.
+    /// Starts a new stroke; what was undone before cannot be redone from here on.
     pub fn begin(&self) {
         self.end();
+        self.undone.store(0, Relaxed);
         self.stamp.store(self.stamp.load(Relaxed).wrapping_add(1).max(1), Relaxed);
         if self.count() == MAX_STROKES {
             self.forget();
@@ -161,9 +168,27 @@ impl Strokes {
         (n < length).then(|| (self.bricks[slot()].load(Relaxed) as usize, self.copy(slot())))
     }
 
-    /// Removes the newest stroke after it was undone.
+    /// Number of undone strokes that can be redone.
+    pub fn undone(&self) -> usize {
+        self.undone.load(Relaxed)
+    }
+
+    /// Makes the stroke that was undone last the newest again; its copies hold what it cut.
+    pub fn take_up(&self) -> bool {
+        let undone = self.undone();
+        if undone > 0 {
+            self.undone.store(undone - 1, Relaxed);
+            let stroke = self.next.fetch_add(1, Relaxed);
+            self.copied.store(self.ends[stroke % MAX_STROKES].load(Relaxed), Relaxed);
+        }
+        undone > 0
+    }
+
+    /// Removes the newest stroke after it was undone; it can be redone until the next one begins.
     pub fn drop_newest(&self) {
         if self.count() > 0 {
+            self.ends[(self.next.load(Relaxed) - 1) % MAX_STROKES].store(self.copied.load(Relaxed), Relaxed);
+            self.undone.fetch_add(1, Relaxed);
             self.copied.fetch_sub(self.length(), Relaxed);
             self.next.fetch_sub(1, Relaxed);
             self.open.store(false, Relaxed);

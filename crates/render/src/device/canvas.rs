@@ -1,5 +1,6 @@
 //! The textures for one picture size, bound to the passes.
 
+use super::average::Mean;
 use super::eye::Eye;
 use super::passes::{Division, Passes};
 use crate::RenderError;
@@ -18,6 +19,8 @@ pub(crate) struct Canvas {
     /// Both eyes' views, for an anaglyph.
     pub anaglyph: Option<Bindings>,
     pub slices: [Bindings; 3],
+    /// Samples of the view at rest, once there are any.
+    pub mean: Option<Mean>,
     /// Rest positions on the brain's cuts, the slices one below the other.
     pub section: Texture,
 }
@@ -53,6 +56,7 @@ impl Canvas {
             slices: bind_slices(gpu, passes, &section)?,
             eyes,
             section,
+            mean: None,
         })
     }
 

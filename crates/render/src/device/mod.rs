@@ -1,6 +1,7 @@
 //! The renderer on the graphics device: one file a pass.
 
 mod anaglyph;
+mod average;
 mod brain;
 mod canvas;
 mod contour;

@@ -1,6 +1,7 @@
 //! The passes, and the division of the picture that they draw.
 
 use super::anaglyph::Anaglyph;
+use super::average::Average;
 use super::brain::Brain;
 use super::cut::Face;
 use super::enlarge::Enlarge;
@@ -29,6 +30,7 @@ pub(crate) struct Passes {
     pub overlay: Shapes,
     pub enlarge: Enlarge,
     pub anaglyph: Anaglyph,
+    pub average: Average,
     pub slices: Slices,
 }
 

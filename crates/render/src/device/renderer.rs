@@ -1,6 +1,7 @@
 //! Draws the picture from its parts: newest poses → changed bricks → brain → rays → light → slices.
 
 use super::anaglyph::Anaglyph;
+use super::average::Average;
 use super::brain::Brain;
 use super::canvas::Canvas;
 use super::contour::Contour;
@@ -16,7 +17,7 @@ use super::skull::Skull;
 use super::slice::Slices;
 use crate::RenderError;
 use crate::bricks::NOTHING;
-use crate::camera::View;
+use crate::camera::{SAMPLES, View};
 use crate::cut::Cut;
 use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
@@ -58,6 +59,7 @@ impl Renderer {
             overlay: Shapes::new(gpu)?,
             enlarge: Enlarge::new(gpu)?,
             anaglyph: Anaglyph::new(gpu)?,
+            average: Average::new(gpu)?,
             slices: Slices::new(gpu)?,
         };
         let moves = passes.brain.is_some();
@@ -80,6 +82,9 @@ impl Renderer {
     pub fn draw(&mut self, frame: &Frame) -> Result<DrawReport, RenderError> {
         let stereo = frame.stereo.map(|s| s.look);
         self.divide(Division { slices: frame.slices.shown, stereo, ..self.canvas.division })?;
+        if let Some(mean) = &mut self.canvas.mean {
+            mean.taken = 0;
+        }
         let (followed, grown) = self.passes.skull.follow(&self.gpu, self.bricks_per_frame)?;
         if grown {
             self.canvas.rebind(&self.gpu, &self.passes)?;
@@ -156,6 +161,36 @@ impl Renderer {
         let Some((brain, _)) = &self.passes.brain else { return 0 };
         let contour = self.contour.as_mut().map_or(0, |c| c.follow(&self.gpu, &planes, brain.border.corners()));
         contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))
+    }
+
+    /// Smooths the edges of the 3-D view by one more sample of every pixel; returns whether there
+    /// was one to add. `frame` must be the one that was drawn last. With stereo or less detail
+    /// edges stay as they are.
+    pub fn refine(&mut self, frame: &Frame) -> Result<bool, RenderError> {
+        let Canvas { eyes, picture, mean, .. } = &mut self.canvas;
+        let (passes, gpu) = (&self.passes, self.gpu.clone());
+        let [eye] = &mut eyes[..] else { return Ok(false) };
+        if eye.apart.is_some() || mean.as_ref().is_some_and(|mean| mean.taken == SAMPLES) {
+            return Ok(false);
+        }
+        let mean = match mean {
+            Some(mean) => mean,
+            None => mean.insert(passes.average.mean(&gpu, &passes.scenes[0], &passes.enlarge, eye.drawn)?),
+        };
+        let view = eye_view(frame, eye.area, 0).sample(mean.taken, eye.drawn);
+        let mut scene = Scene::of(frame, &view, eye.drawn, &passes.skull.grid, passes.mri.texture_from_world);
+        scene.spin.w = 1.0 / (mean.taken + 1) as f32;
+        passes.scenes[0].write(&gpu, 0, &[scene]);
+        let mut recorder = gpu.record("sample");
+        eye.draw(&mut recorder, passes, frame, &scene, &view, &mean.sample);
+        passes.average.draw(&mut recorder, mean, &passes.enlarge, eye.area, picture);
+        recorder.submit();
+        Ok(true)
+    }
+
+    /// Whether bone has changed since the last picture.
+    pub fn is_stale(&mut self) -> bool {
+        self.passes.skull.is_stale()
     }
 
     /// Changes the size of the pictures, width and height.

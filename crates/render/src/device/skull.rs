@@ -14,6 +14,7 @@
 use crate::RenderError;
 use crate::bricks::{Followed, Grid, Leaps, densities};
 use crate::scene::Scene;
+use crate::smooth::Smooth;
 use std::sync::Arc;
 use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
@@ -36,6 +37,7 @@ pub(crate) struct Skull {
     leaps: Leaps,
     seen: Vec<u32>,
     pub density: Texture,
+    smooth: (Smooth, Texture),
     leap: Texture,
     crowd: Texture,
     /// Table and depths of what was cut.
@@ -56,11 +58,13 @@ impl Skull {
             )
         };
         let density = volume("density", grid.dims, Format::R16Float)?;
+        let smooth = Smooth::of(bone.as_deref(), &grid);
+        let smooth_texture = volume("smooth", smooth.dims, Format::R16Float)?;
         let leap = volume("leap", leaps.bricks, Format::R8Uint)?;
         let crowd = volume("crowd", grid.blocks(), Format::R8Unorm)?;
         let table = Buffer::from_slice(gpu, "drilled table", &leaps.drilled.table)?;
         let depths = Buffer::from_slice(gpu, "drilled depths", bytemuck::cast_slice(&leaps.drilled.depths))?;
-        let slots = [&[Slot::Uniform], &VOLUMES[..]].concat();
+        let slots = [&[Slot::Uniform], &VOLUMES[..], &[Slot::Texture3]].concat();
         let pipeline = Pipeline::new(
             gpu,
             &PipelineSpec {
@@ -73,8 +77,8 @@ impl Skull {
                 topology: Topology::Triangles,
             },
         )?;
-        let drilled = (table, depths);
-        let skull = Self { bone, grid, leaps, seen, density, leap, crowd, drilled, pipeline, leaping: true };
+        let (drilled, smooth) = ((table, depths), (smooth, smooth_texture));
+        let skull = Self { bone, grid, leaps, seen, density, smooth, leap, crowd, drilled, pipeline, leaping: true };
         skull.load(gpu);
         Ok(skull)
     }
@@ -100,6 +104,7 @@ impl Skull {
             gpu.record("load").submit();
         }
         self.write_leaps(gpu);
+        self.write_smooth(gpu, [[0; 3], self.smooth.0.dims]);
         let shares = self.grid.shares(self.bone.as_deref());
         self.crowd.write(gpu, [0; 3], self.crowd.size(), &shares);
     }
@@ -110,9 +115,21 @@ impl Skull {
         self.leap.write(gpu, [0; 3], self.leap.size(), &free);
     }
 
+    fn write_smooth(&self, gpu: &Gpu, part: [[usize; 3]; 2]) {
+        let values: Vec<_> =
+            Smooth::part(part, &self.smooth.0).into_iter().map(|hu| half::f16::from_f32(hu.into())).collect();
+        let [first, size] = part.map(|n| n.map(|v| v as u32));
+        self.smooth.1.write(gpu, first, size, &values);
+    }
+
     fn upload(&self, gpu: &Gpu, first: [usize; 3], size: [usize; 3]) {
         let values = densities(self.bone.as_deref(), first, size, |hu| half::f16::from_f32(hu.into()));
         self.density.write(gpu, first.map(|v| v as u32), size.map(|v| v as u32), &values);
+    }
+
+    /// Whether there are changes to follow.
+    pub fn is_stale(&mut self) -> bool {
+        self.bone.as_ref().is_some_and(|bone| bone.changed(&mut self.seen, 0, |_| ()) > 0)
     }
 
     /// Uploads up to `limit` changed bricks; also returns whether passes must be bound again.
@@ -123,6 +140,8 @@ impl Skull {
         for &brick in &changed {
             self.refresh(gpu, &bone, brick);
         }
+        let smoothed = self.smooth.0.follow(&bone, &changed);
+        smoothed.into_iter().for_each(|part| self.write_smooth(gpu, part));
         let touched = self.leaps.follow(&bone, &changed);
         for cells in touched.freed.into_iter().filter(|_| self.leaping) {
             let free = self.leaps.free(self.leaps.index(cells));
@@ -177,7 +196,7 @@ impl Skull {
 
     /// Binds the pass to the frame's uniform.
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
-        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &self.volumes()[..]].concat())?)
+        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &self.volumes()[..], &[(&self.smooth.1).into()]].concat())?)
     }
 
     /// Casts some of the pixels again into `hits`.

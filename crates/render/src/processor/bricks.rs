@@ -1,6 +1,6 @@
 //! CPU version of `bricks.wgsl`: rays through the padded density grid.
 
-use super::drilled::{LIFT_VOXEL, Surface, shown_hu};
+use super::drilled::{Surface, lift, shown_hu};
 use super::line::Line;
 use super::root::enter;
 use crate::bricks::{BLOCK, Followed, Grid, Leaps, NOTHING, densities};
@@ -8,6 +8,7 @@ use crate::cut::height;
 use crate::drilled::LEAP;
 use crate::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
 use crate::scene::Scene;
+use crate::smooth::{Smooth, towards_eye};
 
 use glam::{BVec3A, IVec3, Vec3, Vec3A, Vec4};
 use std::array;
@@ -49,6 +50,7 @@ pub(crate) struct Bricks {
     seen: Vec<u32>,
     /// HU of the padded grid as scanned, x fastest.
     density: Vec<i16>,
+    smooth: Smooth,
     /// Bone fraction of blocks, 0 to 255.
     crowd: Vec<u8>,
     pub casting: Casting,
@@ -60,8 +62,8 @@ impl Bricks {
         let seen = bone.as_ref().map_or_else(Vec::new, |bone| bone.seen());
         let leaps = Leaps::of(bone.as_deref(), &grid);
         let density = densities(bone.as_deref(), [0; 3], grid.dims, |hu| hu);
-        let crowd = grid.shares(bone.as_deref());
-        Self { bone, grid, leaps, seen, density, crowd, casting: Casting::default() }
+        let (smooth, crowd) = (Smooth::of(bone.as_deref(), &grid), grid.shares(bone.as_deref()));
+        Self { bone, grid, leaps, seen, density, smooth, crowd, casting: Casting::default() }
     }
 
     /// Whether there is any bone to show.
@@ -75,9 +77,15 @@ impl Bricks {
         let mut changed = Vec::new();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
         changed.iter().for_each(|&brick| self.refresh(&bone, brick));
+        self.smooth.follow(&bone, &changed);
         self.leaps.follow(&bone, &changed);
         self.leaps.settle();
         Followed::of(&self.grid, &changed, left)
+    }
+
+    /// Whether there are changes to follow.
+    pub fn is_stale(&mut self) -> bool {
+        self.bone.as_ref().is_some_and(|bone| bone.changed(&mut self.seen, 0, |_| ()) > 0)
     }
 
     fn refresh(&mut self, bone: &BoneVolume, brick: [usize; 3]) {
@@ -122,23 +130,26 @@ impl Bricks {
     /// The surface at a point hit by a ray `along`: that of the CT or of the cut.
     #[inline(always)]
     pub fn surface(&self, g: Vec3, along: Vec3) -> Surface {
-        let (dims, strides) = (self.grid.dims, self.strides());
+        let Smooth { dims, values, step, .. } = &self.smooth;
+        let strides = [1, dims[0], dims[0] * dims[1]];
+        let (reach, share) = (self.smooth.reach(&self.grid), 1.0 / *step as f32);
         // Eight points, but only two indices along each axis.
         let pairs: [[(usize, f32); 2]; 3] =
-            array::from_fn(|n| [-1.6, 1.6].map(|by| between(g[n] + by, dims[n], strides[n])));
+            array::from_fn(|n| [-reach, reach].map(|by| between(share * (g[n] + by), dims[n], strides[n])));
         let mut gradient = Vec3::ZERO;
         for i in 0..8 {
             let place = [pairs[0][i & 1], pairs[1][i >> 1 & 1], pairs[2][i >> 2]];
             let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0;
-            gradient += corner * mixed(place, strides, |at| f32::from(self.density[at]));
+            gradient += corner * mixed(place, strides, |at| f32::from(values[at]));
         }
-        // Eight differences over 3.2 voxels, two of which go by each edge.
+        // Eight differences over the cube, two of which go by each edge.
         let over = self.hu(g) - f32::from(self.grid.isovalue);
-        if let Some(bore) = self.leaps.bore(&self.grid, g, over, gradient.length() / (8.0 * 1.6)) {
+        if let Some(bore) = self.leaps.bore(&self.grid, g, over, gradient.length() / (8.0 * reach)) {
             return bore;
         }
-        let normal = if gradient.length_squared() < 1e-6 { -along } else { -gradient.normalize() };
-        Surface { normal, lift: LIFT_VOXEL }
+        let flat = gradient.length_squared() < 1e-6;
+        let normal = if flat { -along } else { towards_eye(-gradient.normalize(), along) };
+        Surface { normal, lift: lift(&self.grid) }
     }
 
     /// Index offsets to the next value along each axis.

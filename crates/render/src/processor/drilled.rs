@@ -11,8 +11,14 @@ use trepan_volume::{AIR_HU, CUT_STEPS};
 /// Steepness with which a cut lowers the density that is shown, HU a node.
 const RAMP_HU: f32 = 1000.0;
 
+/// A numerical parameter: height over the CT's surface at which shadow rays start, mm and voxels,
+/// whichever is more. Over the steps that thick slices leave.
+const LIFT: f32 = 0.8;
+
 /// Height over the CT's surface at which shadow rays start, voxels.
-pub(crate) const LIFT_VOXEL: f32 = 0.8;
+pub(crate) fn lift(grid: &Grid) -> f32 {
+    LIFT * (1.0 / grid.spacing_mm).max(1.0)
+}
 
 /// A surface at a hit.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,12 @@
 //! The view of one eye, with hits kept between pictures.
 
 use super::brain::Fragments;
+use super::edges::Edges;
 use super::skull::{Ray, TILE, cast, clear};
 use super::{Inputs, light, overlay, rows};
 use crate::border::Border;
-use crate::camera::View;
+use crate::bricks::NOTHING;
+use crate::camera::{SAMPLES, View};
 use crate::image::Image;
 use crate::overlay::Item;
 use crate::recast::Recast;
@@ -20,7 +22,12 @@ pub(crate) struct Eye {
     clear: Vec<f32>,
     fragments: Fragments,
     pixels: Vec<[u8; 4]>,
+    /// The edges of the last picture, once they are smoothed.
+    edges: Option<Edges>,
 }
+
+/// Edge pixels that a thread takes at once.
+const CHUNK: usize = 256;
 
 impl Eye {
     pub fn of(area: [u32; 4]) -> Self {
@@ -32,6 +39,7 @@ impl Eye {
             clear: Vec::new(),
             fragments: Fragments::of(width, height),
             pixels: vec![[0; 4]; width * height],
+            edges: None,
         }
     }
 
@@ -50,6 +58,7 @@ impl Eye {
         items: &[Item],
         threads: usize,
     ) -> u32 {
+        self.edges = None;
         let pixels_cast = self.cast(inputs, show_bone, view, threads);
         self.fragments.draw(brain, view, inputs.scene.brain_cut);
         self.light(inputs, view, threads);
@@ -57,6 +66,59 @@ impl Eye {
         let depth = |at: usize| rays[at].t.min(fragments.at(at).t);
         items.iter().for_each(|item| overlay::draw(item, inputs.scene, view, &mut self.pixels, depth));
         pixels_cast
+    }
+
+    /// Whether all samples of the edges are taken.
+    pub fn is_smooth(&self) -> bool {
+        self.edges.as_ref().is_some_and(|edges| edges.taken == SAMPLES || edges.pixels.is_empty())
+    }
+
+    /// The view of the next sample of the edges.
+    pub fn next_view(&mut self, view: &View) -> View {
+        let (pixels, width) = (&self.pixels, self.area[2] as usize);
+        let taken = self.edges.get_or_insert_with(|| Edges::of(pixels, width)).taken;
+        view.sample(taken, self.size())
+    }
+
+    /// Adds a sample of the edges, seen by their next view.
+    pub fn refine(
+        &mut self,
+        inputs: &Inputs,
+        brain: Option<&Border>,
+        show_bone: bool,
+        view: &View,
+        items: &[Item],
+        threads: usize,
+    ) {
+        let Some(mut edges) = self.edges.take() else { return };
+        self.fragments.draw(brain, view, inputs.scene.brain_cut);
+        let [width, height] = self.size().map(|n| n as usize);
+        let (bricks, scene, fragments) = (inputs.bricks, inputs.scene, &self.fragments);
+        let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
+        let cast_bone = show_bone && bricks.is_some();
+        let sample = |pixel: usize| {
+            let at = [pixel % width, pixel / width];
+            let ray = if cast_bone { cast(bricks, scene, at, 0.0, &[]) } else { Ray::NONE };
+            let brain = fragments.at(pixel);
+            let near = tools.map(|tool| overlay::inside(tool, at));
+            (light::fragment(inputs, at, near, &ray, brain), ray.t.min(brain.t))
+        };
+        let mut samples = vec![([0; 4], NOTHING); edges.pixels.len()];
+        rows::share(threads, samples.chunks_mut(CHUNK).enumerate(), |n, chunk| {
+            chunk.iter_mut().zip(&edges.pixels[n * CHUNK..]).for_each(|(to, &pixel)| *to = sample(pixel));
+        });
+        if !items.is_empty() {
+            // Shapes are drawn over a whole picture; only its edges count.
+            let (mut picture, mut depths) = (self.pixels.clone(), vec![NOTHING; self.pixels.len()]);
+            for (&pixel, (colour, t)) in edges.pixels.iter().zip(&samples) {
+                (picture[pixel], depths[pixel]) = (*colour, *t);
+            }
+            items.iter().for_each(|item| overlay::draw(item, scene, view, &mut picture, |at| depths[at]));
+            samples.iter_mut().zip(&edges.pixels).for_each(|((colour, _), &pixel)| *colour = picture[pixel]);
+        }
+        let colours: Vec<[u8; 4]> = samples.into_iter().map(|(colour, _)| colour).collect();
+        edges.add(&colours, &mut self.pixels);
+        self.edges = Some(edges);
     }
 
     fn cast(&mut self, inputs: &Inputs, shown: bool, view: &View, threads: usize) -> u32 {

@@ -2,7 +2,7 @@
 
 use super::Inputs;
 use super::brain::Fragment;
-use super::drilled::{LIFT_VOXEL, Surface};
+use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
 use super::tool::{Met, lit};
 use crate::bricks::NOTHING;
@@ -91,7 +91,7 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
     if scene.forward.w > 0.0 {
         let g = inputs.bricks.grid_of(point);
         open = inputs.bricks.openness(g, brain.normal, scene.bone_cut);
-        if inputs.bricks.shadowed(g, Surface { normal: brain.normal, lift: LIFT_VOXEL }, scene) {
+        if inputs.bricks.shadowed(g, Surface { normal: brain.normal, lift: lift(&inputs.bricks.grid) }, scene) {
             key *= 0.25;
         }
     }

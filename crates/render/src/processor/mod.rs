@@ -11,15 +11,17 @@
 //! by the octant of their direction and test a cell only if its occupancy bit is set (`bricks.rs`).
 //! While the camera moves, rays are sparse ([`Casting::sparse`]): a quarter of the pixels, and the
 //! others where neighbouring tangent planes disagree (`skull.rs`). The hits of the last picture are
-//! kept, as on the device. Triangles of the brain that reach behind the eye are skipped.
+//! kept, as on the device. At rest edges are smoothed (`edges.rs`). Triangles of the brain that
+//! reach behind the eye are skipped.
 //!
 //! # When not to use it
-//! Where there is any driver, even a software one: it draws the same picture and serves the window.
+//! Where there is a graphics card: it draws the same picture and serves the window.
 
 mod brain;
 mod bricks;
 mod contour;
 mod drilled;
+mod edges;
 mod eye;
 mod light;
 mod line;
@@ -161,6 +163,32 @@ impl ProcessorRenderer {
         }
         self.eyes = eyes;
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
+    }
+
+    /// Smooths the edges of the 3-D view by one more sample of a pixel; returns whether there was
+    /// one to add. `frame` must be the one that was drawn last. With stereo edges stay as they are.
+    pub fn refine(&mut self, frame: &Frame) -> bool {
+        let mut eyes = std::mem::take(&mut self.eyes);
+        let added = match &mut eyes[..] {
+            [eye] if !eye.is_smooth() => {
+                let view = eye.next_view(&eye_view(frame, eye.area, 0));
+                let mri_from_world = self.mri.as_ref().map(|m| m.texture_from_world);
+                let scene = Scene::of(frame, &view, eye.size(), &self.bricks.grid, mri_from_world);
+                let (items, _) = items(&frame.overlay, view.eye);
+                let brain = self.brain.as_ref().filter(|_| frame.show_brain);
+                eye.refine(&self.inputs(frame, &scene), brain, frame.show_bone, &view, &items, self.threads);
+                eye.show(&mut self.picture, false);
+                true
+            }
+            _ => false,
+        };
+        self.eyes = eyes;
+        added
+    }
+
+    /// Whether bone has changed since the last picture.
+    pub fn is_stale(&mut self) -> bool {
+        self.bricks.is_stale()
     }
 
     fn inputs<'a>(&'a self, frame: &Frame<'a>, scene: &'a Scene) -> Inputs<'a> {

@@ -1,7 +1,7 @@
 //! CPU version of `skull.wgsl`: the bone's isosurface at a pixel.
 
 use super::bricks::{Bricks, under};
-use super::drilled::{LIFT_VOXEL, Surface};
+use super::drilled::{Surface, lift};
 use crate::bricks::NOTHING;
 use crate::cut::height;
 use crate::scene::Scene;
@@ -57,7 +57,7 @@ pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32
     }
     let g = o + d * t;
     let surface = if on_cut(scene.bone_cut, eye + t * along) {
-        Surface { normal: scene.bone_cut.truncate(), lift: LIFT_VOXEL }
+        Surface { normal: scene.bone_cut.truncate(), lift: lift(&bricks.grid) }
     } else {
         bricks.surface(g, along)
     };

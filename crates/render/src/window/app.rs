@@ -1,16 +1,21 @@
 //! One picture of the window: input → session → renderer → panel.
 
+use super::answers::{self, Answers};
 use super::capture::Captures;
-use super::input::{Pointer, ViewAndTool};
+use super::guide::{Around, Guide};
+use super::input::ViewAndTool;
 use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
-use super::quality::Quality;
-use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, banner, timeline};
-use crate::{Frame, RenderError, View};
+use super::pointer::Pointer;
+use super::quality::{Quality, Step};
+use super::surface::{Ray, Surfaces};
+use super::{Draws, Lent, Panel, Playback, Refined, Session, Shared, Start, WindowInput, aids, banner, timeline};
+use crate::{Frame, Image, RenderError, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
-use std::time::Duration;
+use glam::Vec3;
+use std::time::{Duration, Instant};
 
 /// How the picture gets into the window.
 enum Screen {
@@ -20,8 +25,11 @@ enum Screen {
     Copies(Option<egui::TextureHandle>),
 }
 
-/// Width of the side panel, points.
+/// First and least width of the side panel, points; at most half of the window.
 const PANEL_WIDTH: f32 = 270.0;
+const PANEL_LEAST: f32 = 180.0;
+/// Longest time between pictures that the tool is led by, s.
+const LONGEST_S: f32 = 0.1;
 /// Scale of large type.
 const LARGE: f32 = 1.4;
 
@@ -35,6 +43,9 @@ pub(super) struct Window<S, D> {
     clicks: Clicks,
     look: Look,
     captures: Captures,
+    pub(super) answers: Answers,
+    /// The tool's tip as contact allows it, world mm.
+    tip: Vec3,
     help: bool,
     large: bool,
     playback: Option<Playback>,
@@ -42,7 +53,11 @@ pub(super) struct Window<S, D> {
     audio: super::loudspeaker::AudioOutput,
     screen: Screen,
     quality: Quality,
-    drawn_at: f64,
+    /// The last picture: its view and texture.
+    last: Option<(View, egui::TextureId)>,
+    /// Time of the last picture, s.
+    pub(super) drawn_at: f64,
+    over: bool,
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
@@ -50,13 +65,15 @@ impl<S: Session, D: Draws> Window<S, D> {
         let hardware = lent.borrow().as_ref().and_then(|s| s.renderer.device()).is_some_and(|gpu| !gpu.is_software());
         Self {
             lent,
-            hand: ViewAndTool { world_from_tool: start.world_from_tool, camera: start.camera },
+            hand: ViewAndTool { world_from_tool: start.world_from_tool, camera: start.camera, guide: Guide::default() },
             traces: Traces::default(),
             panel: Panel::default(),
             clicks: Clicks::default(),
             look: Look::with(start.microscope),
             start,
             captures: Captures::default(),
+            answers: Answers::default(),
+            tip: start.world_from_tool.translation,
             help: false,
             large: false,
             playback: None,
@@ -64,53 +81,79 @@ impl<S: Session, D: Draws> Window<S, D> {
             audio: Default::default(),
             screen: if copies { Screen::Copies(None) } else { Screen::Shares(None) },
             quality: Quality::new(!hardware, start.detail),
+            last: None,
             drawn_at: 0.0,
+            over: false,
         }
+    }
+
+    /// Whether the session is finished, cannot be drawn, or was closed by the user.
+    pub fn is_over(&self) -> bool {
+        self.over
     }
 
     /// Draws one picture of the whole window.
     pub fn show(&mut self, ui: &mut egui::Ui, state: Option<&RenderState>) {
-        let lent = self.lent.clone();
+        let (lent, began) = (self.lent.clone(), Instant::now());
         let mut lent = lent.borrow_mut();
         let Some(shared) = lent.as_mut() else { return };
         self.captures.turn(ui.ctx(), &mut shared.session);
         self.react(ui);
         self.update(ui, shared);
-        egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
-            let (camera, filming) = (&mut self.hand.camera, self.captures.filming());
-            self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, camera, filming);
+        let widest = 0.5 * ui.available_width();
+        let side = egui::Panel::right("panel").default_size(PANEL_WIDTH.min(widest));
+        side.size_range(PANEL_LEAST.min(widest)..=widest).show(ui, |ui| {
+            let filming = self.captures.filming();
+            self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, &mut self.hand, filming);
         });
         self.playback = self.panel.timeline.as_ref().and_then(|timeline| timeline::show(ui, timeline));
         let picture = egui::CentralPanel::default().frame(egui::Frame::NONE);
         let over = picture.show(ui, |ui| self.picture(ui, state, shared)).response.rect;
-        banner::show(ui, over, &self.panel.warnings, &self.panel.news);
+        if let Some(playback) = self.playback {
+            self.answers.give(answers::played(playback), self.drawn_at);
+        }
+        banner::show(ui, over, &self.panel, self.answers.standing(self.drawn_at));
         if self.help {
             keys::help(ui.ctx(), &self.panel.actions);
         }
-        if shared.fault.is_some() {
-            ui.send_viewport_cmd(egui::ViewportCommand::Close);
-        }
-        ui.request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));
+        self.over |= shared.fault.is_some();
+        let rate_hz = self.start.rate_hz.min(self.quality.most_hz());
+        let period = Duration::from_secs_f32(1.0 / rate_hz.clamp(1.0, 240.0));
+        ui.request_repaint_after(period.saturating_sub(began.elapsed()));
     }
 
     /// Handles keys and clicks that concern the window itself.
     fn react(&mut self, ui: &egui::Ui) {
         let mut commands = std::mem::take(&mut self.clicks.commands);
         ui.input(|input| commands.extend(keys::pressed(input)));
+        let now = ui.input(|i| i.time);
+        if let Some(why) = ui.input(|i| answers::unused_key(i, &self.panel)) {
+            self.answers.give(why, now);
+        }
         for &command in &commands {
+            if let Some(why) = answers::refusal(command, &self.panel, &self.look) {
+                self.answers.give(format!("{}: {why}", keys::name(command)), now);
+                continue;
+            }
             match command {
                 Command::Reset => self.hand.camera = self.look.home(self.start.camera, self.start.microscope),
+                Command::FocusTool => self.hand.camera.target = self.tip,
+                Command::Withdraw => self.hand.guide.withdraws = true,
                 Command::Picture => self.captures.ask(),
                 Command::Film => self.captures.film(),
                 Command::Help => self.help ^= true,
                 Command::LargeType => self.enlarge(ui),
+                Command::Light => self.light(ui),
+                Command::FullScreen => self.fill(ui),
                 #[cfg(feature = "sound")]
                 Command::Mute => self.audio.muted ^= true,
                 Command::Quit if std::mem::take(&mut self.help) => (),
-                Command::Quit => ui.send_viewport_cmd(egui::ViewportCommand::Close),
+                Command::Quit => self.over = true,
                 of_view => self.look.react(of_view, &mut self.hand.camera),
             }
+            self.answers.give(answers::done(command, keys::name(command), &self.look, self.large), now);
         }
+        commands.retain(|command| answers::refusal(*command, &self.panel, &self.look).is_none());
         self.clicks.commands = commands;
     }
 
@@ -119,17 +162,29 @@ impl<S: Session, D: Draws> Window<S, D> {
         ui.set_zoom_factor(if self.large { LARGE } else { 1.0 });
     }
 
+    fn light(&mut self, ui: &egui::Ui) {
+        let dark = ui.visuals().dark_mode;
+        ui.set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
+    }
+
+    fn fill(&mut self, ui: &egui::Ui) {
+        let fills = ui.input(|i| i.viewport().fullscreen.unwrap_or(false));
+        ui.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!fills));
+    }
+
     /// Updates the session.
     fn update(&mut self, ui: &egui::Ui, shared: &mut Shared<S, D>) {
         let requested = |command| self.clicks.commands.contains(&command);
         let actions = self.panel.actions.iter().enumerate();
         let input = ui.input(|i| WindowInput {
             world_from_tool: self.hand.world_from_tool,
-            pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
+            pedal: i.key_down(egui::Key::Space) || self.clicks.pedal || self.hand.guide.pedal(),
             next_tool: requested(Command::NextTool),
             undo: requested(Command::Undo),
-            chosen: self.clicks.chosen,
+            redo: requested(Command::Redo),
+            chosen: self.clicks.chosen.or_else(|| self.numbered(i)),
             actions: actions
+                .filter(|(_, action)| action.why_not.is_none())
                 .filter(|(_, action)| keys::of_action(action).is_some_and(|key| i.key_pressed(key)))
                 .fold(self.clicks.actions, |bits, (at, _)| bits | 1 << at),
             playback: self.playback,
@@ -139,13 +194,18 @@ impl<S: Session, D: Draws> Window<S, D> {
         self.panel = shared.session.update(&input);
         #[cfg(feature = "sound")]
         self.panel.values.extend(self.audio.play(self.panel.sound).map(|why| ("sound".into(), why)));
-        self.panel.leash.into_iter().for_each(|leash| self.hand.hold(leash));
         let now = self.panel.timeline.as_ref().map_or(input.seconds, |timeline| timeline.at_s);
         self.traces.force.push(now, self.panel.force_n.into());
         self.traces.rate.push(now, self.panel.rate_hz.into());
-        if self.panel.finished {
-            ui.send_viewport_cmd(egui::ViewportCommand::Close);
-        }
+        self.over |= self.panel.finished;
+    }
+
+    /// The tool whose number key was pressed.
+    fn numbered(&self, input: &egui::InputState) -> Option<[usize; 2]> {
+        let slot = answers::NUMBERS.iter().position(|key| input.key_pressed(*key))?;
+        let choice = self.panel.choices.first().filter(|choice| !choice.tools.is_empty())?;
+        let open = choice.options.get(slot).is_some_and(|(_, open)| *open) && choice.chosen != slot;
+        open.then_some([0, slot])
     }
 
     /// Draws the picture for an area of the window and shows it there.
@@ -153,25 +213,66 @@ impl<S: Session, D: Draws> Window<S, D> {
         let space = ui.available_size().max(egui::vec2(8.0, 8.0));
         let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
         let now = ui.input(|i| i.time);
-        self.quality.note(now - self.drawn_at);
         self.drawn_at = now;
         let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
         let frame = self.look.on(shared.session.frame(self.hand.camera));
-        match self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, self.quality.detail()) {
+        let stale = shared.renderer.is_stale();
+        let (step, began) = (self.quality.step(&frame, pixels, stale, now), Instant::now());
+        let shown = match (step, self.last) {
+            (Step::Keep, Some(last)) => Ok(last),
+            (Step::Refine, Some(last)) => {
+                if !self.screen.refine(&mut shared.renderer, &frame) {
+                    self.quality.complete();
+                }
+                Ok(last)
+            }
+            (Step::Draw(detail), _) => self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, detail),
+            _ => self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, 1.0),
+        };
+        self.quality.note(began.elapsed().as_secs_f64(), now);
+        match shown {
             Err(error) => shared.fault = Some(error.to_string()),
             Ok((view, id)) => {
-                let pointer = Pointer::over(ui, &response);
-                self.hand.follow(&pointer, &view, space.y);
-                // A focused slider takes the arrow keys.
-                if ui.memory(|memory| memory.focused().is_none()) {
-                    ui.input(|i| self.hand.keys(i, &view));
-                }
+                self.last = Some((view, id));
                 let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
                 ui.painter().image(id, area, whole, egui::Color32::WHITE);
+                self.lead(ui, &response, &view, &shared.session);
+                let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
+                let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
+                ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, self.quality.text(), font, grey);
                 shared.shown = true;
             }
         }
+    }
+
+    /// Moves view and tool by pointer and keys, and draws where the tool will land.
+    fn lead(&mut self, ui: &egui::Ui, response: &egui::Response, view: &View, session: &S) {
+        let frame = self.look.on(session.frame(self.hand.camera));
+        let pointer = Pointer::over(ui, response, view);
+        self.hand.follow(&pointer, view, response.rect.height());
+        // A focused slider takes the arrow keys.
+        if ui.memory(|memory| memory.focused().is_none()) {
+            ui.input(|i| self.hand.keys(i, view));
+        }
+        let Some(tool) = frame.tool.filter(|_| self.panel.timeline.is_none()) else { return };
+        let cast = |ray: &Ray| session.surface(ray);
+        let around = Around {
+            surfaces: Surfaces::new(&cast, [frame.show_bone, frame.show_brain], frame.cut),
+            view,
+            tool,
+            world_from_tool: frame.world_from_tool,
+            dt_s: ui.input(|i| i.stable_dt).min(LONGEST_S),
+            pedal: ui.input(|i| i.key_down(egui::Key::Space)) || self.clicks.pedal,
+        };
+        self.tip = frame.world_from_tool.translation;
+        self.look.follow(&mut self.hand.camera, self.tip);
+        let ViewAndTool { world_from_tool, guide, .. } = &mut self.hand;
+        guide.follow(world_from_tool, &pointer, &around);
+        if let Some(leash) = self.panel.leash {
+            self.hand.hold(leash, &around.surfaces, tool.tip_radius_mm);
+        }
+        aids::show(ui, response.rect, &around, &self.panel, self.hand.guide.is_pressed());
     }
 }
 
@@ -187,6 +288,19 @@ enum ShowError {
 }
 
 impl Screen {
+    /// Smooths the edges of the last picture by one more sample; returns whether there was one to
+    /// add.
+    fn refine(&mut self, renderer: &mut impl Draws, frame: &Frame<'_>) -> bool {
+        // A lost device is met by the next picture.
+        match (renderer.refine(frame, matches!(self, Self::Copies(_))), self) {
+            (Ok(Refined::Copied(image)), Self::Copies(Some(copy))) => {
+                copy.set(colours(&image), egui::TextureOptions::LINEAR);
+                true
+            }
+            (refined, _) => matches!(refined, Ok(Refined::Drawn)),
+        }
+    }
+
     /// Draws a frame and returns the window's texture of it.
     fn show(
         &mut self,
@@ -201,12 +315,10 @@ impl Screen {
             Self::Shares(texture) => texture,
             Self::Copies(copy) => {
                 let (view, image) = renderer.picture(frame, pixels, detail)?;
-                let size = [image.width as usize, image.height as usize];
-                let image = egui::ColorImage::from_rgba_unmultiplied(size, &image.rgba);
                 let linear = egui::TextureOptions::LINEAR;
                 let copy =
                     copy.get_or_insert_with(|| ui.ctx().load_texture("picture", egui::ColorImage::default(), linear));
-                copy.set(image, linear);
+                copy.set(colours(&image), linear);
                 return Ok((view, copy.id()));
             }
         };
@@ -219,6 +331,12 @@ impl Screen {
         *self = Self::Copies(None);
         self.show(ui, Some(state), renderer, frame, pixels, detail)
     }
+}
+
+/// A picture as egui takes it.
+fn colours(image: &Image) -> egui::ColorImage {
+    // It is opaque, so that nothing is to be multiplied.
+    egui::ColorImage::from_rgba_premultiplied([image.width as usize, image.height as usize], &image.rgba)
 }
 
 /// Registers the renderer's texture, again when it changed.
@@ -241,5 +359,8 @@ fn registered(
 impl<S: Session, D: Draws> eframe::App for Window<S, D> {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         self.show(ui, frame.wgpu_render_state());
+        if self.over {
+            ui.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
     }
 }

@@ -1,16 +1,18 @@
-//! Warning banners: large black letters on vermilion across the picture.
-//! The word itself is shown too, so that colour is not needed. Information such as a pause is on
-//! sky blue below.
+//! The warning line: large black letters on vermilion across the picture.
+//! The most urgent warning stands alone. The word itself is shown too, so that colour is not
+//! needed. Information such as a pause is on sky blue below; notices on device and machine stand
+//! small at the picture's lower edge.
 //!
 //! # Practice
 //! They overlap the picture's upper edge: making room would change the picture's size and recast it
 //! each time.
 
-use super::palette::{SKY, VERMILION};
+use super::Panel;
+use super::palette::{PALE as GREY, SKY, VERMILION};
 use eframe::egui::{self, Color32, Rect, RichText};
 
-/// Shows warnings and news over an area of the window while there are any.
-pub(crate) fn show(ui: &egui::Ui, over: Rect, warnings: &[String], news: &[String]) {
+/// Shows the most urgent warning, the news and an answer to the user over an area of the window.
+pub(crate) fn show(ui: &egui::Ui, over: Rect, panel: &Panel, answer: Option<&str>) {
     let area = egui::Area::new(egui::Id::unique("banner"))
         .fixed_pos(over.min)
         .interactable(false)
@@ -19,9 +21,18 @@ pub(crate) fn show(ui: &egui::Ui, over: Rect, warnings: &[String], news: &[Strin
     area.show(ui.ctx(), |ui| {
         ui.set_width(over.width());
         ui.spacing_mut().item_spacing.y = 0.0;
-        strip(ui, "WARNING   ", 24.0, VERMILION, warnings);
-        strip(ui, "", 18.0, SKY, news);
+        strip(ui, "WARNING   ", 24.0, VERMILION, &panel.warnings[..panel.warnings.len().min(1)]);
+        strip(ui, "", 18.0, SKY, &panel.news);
+        strip(ui, "", 16.0, GREY, answer.map(String::from).as_slice());
     });
+    let notes = panel.technical.join("; ");
+    if !notes.is_empty() {
+        let (at, font) = (over.left_bottom() + egui::vec2(8.0, -6.0), egui::FontId::proportional(13.0));
+        let galley = ui.painter().layout(notes, font, GREY, over.width() - 16.0);
+        let area = Rect::from_min_size(at - egui::vec2(0.0, galley.size().y), galley.size());
+        ui.painter().rect_filled(area.expand(4.0), 3.0, Color32::from_black_alpha(190));
+        ui.painter().galley(area.min, galley, GREY);
+    }
 }
 
 fn strip(ui: &mut egui::Ui, word: &str, size: f32, colour: Color32, lines: &[String]) {

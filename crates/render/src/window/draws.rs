@@ -3,6 +3,17 @@
 use crate::{Frame, Image, Painter, RenderError, Renderer, View};
 use trepan_gpu::{Gpu, Texture};
 
+/// What a further sample of the edges gave.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Refined {
+    /// There was none to add.
+    Complete,
+    /// It is in the renderer's texture.
+    Drawn,
+    /// The finished picture.
+    Copied(Image),
+}
+
 /// Draws the pictures of a window: a [`Renderer`], or a [`Painter`], which falls back to the
 /// processor.
 pub trait Draws {
@@ -20,6 +31,17 @@ pub trait Draws {
     /// Like [`draw`](Self::draw), but returns a finished picture for a window on another device. It
     /// may have fewer pixels.
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError>;
+
+    /// Smooths the edges of the last picture by one more sample. With `copied` returns the finished
+    /// picture.
+    fn refine(&mut self, _frame: &Frame, _copied: bool) -> Result<Refined, RenderError> {
+        Ok(Refined::Complete)
+    }
+
+    /// Whether bone has changed since the last picture.
+    fn is_stale(&mut self) -> bool {
+        false
+    }
 }
 
 impl Draws for Renderer {
@@ -40,6 +62,18 @@ impl Draws for Renderer {
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
         let view = Draws::draw(self, frame, size, detail)?;
         Ok((view, self.image()?))
+    }
+
+    fn refine(&mut self, frame: &Frame, copied: bool) -> Result<Refined, RenderError> {
+        Ok(match Renderer::refine(self, frame)? {
+            false => Refined::Complete,
+            true if copied => Refined::Copied(self.image()?),
+            true => Refined::Drawn,
+        })
+    }
+
+    fn is_stale(&mut self) -> bool {
+        Renderer::is_stale(self)
     }
 }
 
@@ -63,5 +97,17 @@ impl Draws for Painter {
         self.fit(size, detail)?;
         let (image, _) = Painter::picture(self, frame)?;
         Ok((self.view(frame), image))
+    }
+
+    fn refine(&mut self, frame: &Frame, copied: bool) -> Result<Refined, RenderError> {
+        Ok(match Painter::refine(self, frame)? {
+            false => Refined::Complete,
+            true if copied => Refined::Copied(self.image()?),
+            true => Refined::Drawn,
+        })
+    }
+
+    fn is_stale(&mut self) -> bool {
+        Painter::is_stale(self)
     }
 }

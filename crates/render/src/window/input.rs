@@ -1,9 +1,12 @@
 //! Mouse and keyboard input, converted to a camera and a target tool pose.
 
+use super::guide::Guide;
+use super::pointer::Pointer;
+use super::surface::Surfaces;
 use super::{Leash, Playback};
 use crate::{Camera, View};
 use eframe::egui;
-use glam::{Quat, Vec2};
+use glam::{Quat, Vec2, Vec3};
 use trepan_geometry::Pose;
 
 /// The user's input, once per picture.
@@ -17,6 +20,8 @@ pub struct WindowInput {
     pub next_tool: bool,
     /// Whether an undo of the last stroke was requested since the last picture.
     pub undo: bool,
+    /// Whether a redo of the stroke undone last was requested since the last picture.
+    pub redo: bool,
     /// A selected option of a panel choice: index of the choice, index of the option.
     pub chosen: Option<[usize; 2]>,
     /// The panel's actions requested since the last picture, one bit each.
@@ -33,8 +38,6 @@ pub struct WindowInput {
 const ORBIT_RAD: f32 = 0.008;
 /// Tilt of the shaft for a drag, rad per point.
 const TILT_RAD: f32 = 0.006;
-/// Push by the wheel, mm per point scrolled.
-const PUSH_MM: f32 = 0.02;
 /// Move for a key, mm.
 const KEY_MM: f32 = 0.5;
 
@@ -43,51 +46,41 @@ const KEY_MM: f32 = 0.5;
 pub(crate) struct ViewAndTool {
     pub world_from_tool: Pose,
     pub camera: Camera,
-}
-
-/// Pointer input over the 3-D view since the last picture, in points.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pointer {
-    pub left: Vec2,
-    pub right: Vec2,
-    pub wheel: f32,
-    pub tilt: bool,
-    /// Zoom factor: egui computes it from the wheel with Ctrl and from two-finger gestures.
-    pub zoom: f32,
-}
-
-impl Default for Pointer {
-    fn default() -> Self {
-        Self { left: Vec2::ZERO, right: Vec2::ZERO, wheel: 0.0, tilt: false, zoom: 1.0 }
-    }
+    pub guide: Guide,
 }
 
 impl ViewAndTool {
-    /// Moves tool and camera. `height` is that of the 3-D view in points.
+    /// Moves the camera and tilts the tool. `height` is that of the 3-D view in points.
     pub fn follow(&mut self, pointer: &Pointer, view: &View, height: f32) {
-        let tip = self.world_from_tool.translation;
-        let depth = (tip - view.eye).dot(view.forward).max(1.0);
-        let mm = 2.0 * depth * view.half.y / height.max(1.0);
-        let drag = pointer.left;
-        if pointer.tilt {
-            let turn = Quat::from_axis_angle(view.up, drag.x * TILT_RAD)
-                * Quat::from_axis_angle(view.right, drag.y * TILT_RAD);
+        if pointer.tilt && pointer.left != Vec2::ZERO {
+            let turn = Quat::from_axis_angle(view.up, pointer.left.x * TILT_RAD)
+                * Quat::from_axis_angle(view.right, pointer.left.y * TILT_RAD);
             self.world_from_tool.rotation = (turn * self.world_from_tool.rotation).normalize();
-        } else {
-            self.world_from_tool.translation += mm * (drag.x * view.right - drag.y * view.up);
+            self.guide.tilt(true);
         }
-        self.camera.zoom(pointer.zoom.max(1e-3).recip());
-        let sight = (tip - view.eye).normalize_or(view.forward);
-        self.world_from_tool.translation += PUSH_MM * pointer.wheel * sight;
-        self.camera.orbit(-ORBIT_RAD * pointer.right.x, ORBIT_RAD * pointer.right.y);
+        let factor = pointer.zoom.max(1e-3).recip();
+        self.camera.zoom_at(factor, pointer.at.unwrap_or(Vec2::ZERO), view.half.x / view.half.y);
+        let (pans, turns) =
+            if pointer.tilt { (pointer.middle + pointer.right, Vec2::ZERO) } else { (pointer.middle, pointer.right) };
+        let mm = 2.0 * self.camera.distance_mm * view.half.y / height.max(1.0);
+        self.camera.pan(-mm * pans.x, mm * pans.y);
+        self.camera.orbit(-ORBIT_RAD * turns.x, ORBIT_RAD * turns.y);
     }
 
-    /// Limits the target pose to the leash.
-    pub fn hold(&mut self, leash: Leash) {
+    /// Limits the target pose to the leash. In free air the hand leads as far as the air reaches,
+    /// past a surface by the leash's length at most.
+    pub fn hold(&mut self, leash: Leash, surfaces: &Surfaces<'_>, radius_mm: f32) {
         let hand = &mut self.world_from_tool.translation;
-        if leash.tip.is_finite() {
-            *hand = leash.tip + (*hand - leash.tip).clamp_length_max(leash.length_mm);
+        if !leash.tip.is_finite() {
+            return;
         }
+        let way = *hand - leash.tip;
+        let free = || match way.try_normalize() {
+            Some(along) => surfaces.ahead(leash.tip, along, way.length() + radius_mm),
+            None => None,
+        };
+        let longest = free().map_or(f32::INFINITY, |hit| leash.length_mm.max(hit.distance_mm - radius_mm));
+        *hand = leash.tip + way.clamp_length_max(longest);
     }
 
     /// Moves the tool by keys.
@@ -97,80 +90,61 @@ impl ViewAndTool {
         let step = pair(egui::Key::ArrowRight, egui::Key::ArrowLeft) * view.right
             + pair(egui::Key::ArrowUp, egui::Key::ArrowDown) * view.up
             + pair(egui::Key::PageUp, egui::Key::PageDown) * view.forward;
-        self.world_from_tool.translation += KEY_MM * step;
+        if step != Vec3::ZERO {
+            self.world_from_tool.translation += KEY_MM * step;
+            self.guide.stay();
+        }
         let zoom = pair(egui::Key::Minus, egui::Key::Plus) - pressed(egui::Key::Equals);
         self.camera.zoom(1.1f32.powf(zoom));
     }
 }
 
-impl Pointer {
-    /// Pointer input over a widget.
-    pub fn over(ui: &egui::Ui, response: &egui::Response) -> Self {
-        let drag = |button| if response.dragged_by(button) { response.drag_delta() } else { egui::Vec2::ZERO };
-        let (left, right) = (drag(egui::PointerButton::Primary), drag(egui::PointerButton::Secondary));
-        let hovered = response.hovered();
-        ui.input(|input| Self {
-            left: Vec2::new(left.x, left.y),
-            right: Vec2::new(right.x, right.y),
-            wheel: if hovered { input.smooth_scroll_delta().y } else { 0.0 },
-            tilt: input.modifiers.shift,
-            zoom: if hovered { input.zoom_delta() } else { 1.0 },
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::surface::tests::slab;
     use super::*;
-    use glam::Vec3;
 
     fn hand() -> (ViewAndTool, View) {
         let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
         let world_from_tool = Pose::from_translation(Vec3::new(5.0, 20.0, 3.0));
-        (ViewAndTool { world_from_tool, camera }, camera.view(1.5))
+        (ViewAndTool { world_from_tool, camera, guide: Guide::default() }, camera.view(1.5))
     }
 
     #[test]
-    fn a_left_drag_moves_the_tip_under_the_pointer() {
-        let (mut hand, view) = hand();
-        let before = view.project(hand.world_from_tool.translation).0;
-        let pointer = Pointer { left: Vec2::new(30.0, -12.0), ..Default::default() };
-        hand.follow(&pointer, &view, 600.0);
-        let after = view.project(hand.world_from_tool.translation).0;
-        let moved = (after - before) * Vec2::new(0.5 * 900.0, -0.5 * 600.0);
-        assert!((moved - pointer.left).length() < 0.01, "{moved}");
-    }
-
-    #[test]
-    fn the_wheel_pushes_along_the_line_of_sight_and_zooms_with_control() {
-        let (mut hand, view) = hand();
-        let before = hand.world_from_tool.translation;
-        hand.follow(&Pointer { wheel: 50.0, ..Default::default() }, &view, 600.0);
-        let pushed = hand.world_from_tool.translation - before;
-        assert!((pushed.length() - 1.0).abs() < 1e-4 && pushed.dot(before - view.eye) > 0.0);
-        hand.follow(&Pointer { zoom: 1.25, ..Default::default() }, &view, 600.0);
-        assert!(hand.camera.distance_mm < 200.0 && hand.world_from_tool.translation == before + pushed);
-    }
-
-    #[test]
-    fn a_leash_holds_the_hand_near_the_tool() {
+    fn a_leash_holds_the_hand_near_a_surface_and_lets_it_fly_in_air() {
         let (mut hand, _) = hand();
-        let at = hand.world_from_tool.translation;
-        hand.hold(Leash { tip: at + Vec3::X, length_mm: 2.0 });
-        assert_eq!(hand.world_from_tool.translation, at);
-        hand.hold(Leash { tip: at + 10.0 * Vec3::X, length_mm: 2.0 });
-        assert!((hand.world_from_tool.translation - (at + 8.0 * Vec3::X)).length() < 1e-5);
-        hand.hold(Leash { tip: Vec3::NAN, length_mm: 2.0 });
+        let surfaces = Surfaces::new(&slab, [true; 2], None);
+        let tip = Vec3::new(20.0, 0.0, 3.0);
+        let leash = Leash { tip, length_mm: 2.0 };
+        hand.world_from_tool.translation = tip + Vec3::X;
+        hand.hold(leash, &surfaces, 3.0);
+        assert_eq!(hand.world_from_tool.translation, tip + Vec3::X);
+        hand.world_from_tool.translation = tip - 10.0 * Vec3::Z;
+        hand.hold(leash, &surfaces, 3.0);
+        assert!((hand.world_from_tool.translation - (tip - 2.0 * Vec3::Z)).length() < 1e-5, "it touches");
+        let high = Leash { tip: tip + 9.0 * Vec3::Z, ..leash };
+        hand.world_from_tool.translation = tip - 10.0 * Vec3::Z;
+        hand.hold(high, &surfaces, 3.0);
+        assert!((hand.world_from_tool.translation - tip).length() < 1e-4, "to the surface, not into it");
+        hand.world_from_tool.translation = tip + 50.0 * Vec3::Z;
+        hand.hold(leash, &surfaces, 3.0);
+        assert_eq!(hand.world_from_tool.translation, tip + 50.0 * Vec3::Z);
+        hand.hold(Leash { tip: Vec3::NAN, length_mm: 2.0 }, &surfaces, 3.0);
         assert!(hand.world_from_tool.translation.is_finite());
     }
 
     #[test]
     fn a_right_drag_circles_and_a_shifted_drag_tilts_about_the_tip() {
         let (mut hand, view) = hand();
-        hand.follow(&Pointer { right: Vec2::new(10.0, 5.0), ..Default::default() }, &view, 600.0);
+        hand.follow(&Pointer { right: Vec2::new(10.0, 5.0), ..Pointer::NONE }, &view, 600.0);
         assert!(hand.camera.azimuth_rad < std::f32::consts::FRAC_PI_2 && hand.camera.elevation_rad > 0.0);
+        let turned = hand.camera;
+        hand.follow(&Pointer { middle: Vec2::new(60.0, 0.0), ..Pointer::NONE }, &view, 600.0);
+        hand.follow(&Pointer { right: Vec2::new(-60.0, 0.0), tilt: true, ..Pointer::NONE }, &view, 600.0);
+        assert!((hand.camera.target - turned.target).length() < 1e-4, "panned there and back");
+        assert_eq!((hand.camera.azimuth_rad, hand.camera.elevation_rad), (turned.azimuth_rad, turned.elevation_rad));
         let tip = hand.world_from_tool.translation;
-        hand.follow(&Pointer { left: Vec2::new(100.0, 0.0), tilt: true, ..Default::default() }, &view, 600.0);
+        hand.follow(&Pointer { left: Vec2::new(100.0, 0.0), tilt: true, ..Pointer::NONE }, &view, 600.0);
         assert_eq!(hand.world_from_tool.translation, tip);
         assert!(
             hand.world_from_tool.rotation.angle_between(Quat::IDENTITY) > 0.5
@@ -193,7 +167,8 @@ mod tests {
                 let input = egui::RawInput { screen_rect: Some(screen), events, ..Default::default() };
                 let mut drawn = context.run_ui(input, |ui| {
                     let (_, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
-                    let pointer = Pointer::over(ui, &response);
+                    let pointer =
+                        Pointer::over(ui, &response, &Camera::viewed_from(Vec3::ZERO, Vec3::Y, 60.0).view(1.0));
                     (zoom, wheel) = (zoom * pointer.zoom, wheel + pointer.wheel);
                 });
                 drawn.textures_delta.clear();
@@ -209,7 +184,7 @@ mod tests {
     #[test]
     fn a_drag_over_the_picture_is_noticed_through_egui() {
         let context = egui::Context::default();
-        let mut seen = Pointer::default();
+        let mut seen = Pointer::NONE;
         let mut press = |pos: egui::Pos2, pressed: Option<bool>| {
             let mut events = vec![egui::Event::PointerMoved(pos)];
             let button = egui::PointerButton::Primary;
@@ -223,7 +198,7 @@ mod tests {
             let input = egui::RawInput { screen_rect: Some(screen), events, ..Default::default() };
             let mut drawn = context.run_ui(input, |ui| {
                 let (_, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
-                seen = Pointer::over(ui, &response);
+                seen = Pointer::over(ui, &response, &Camera::viewed_from(Vec3::ZERO, Vec3::Y, 60.0).view(4.0 / 3.0));
             });
             drawn.textures_delta.clear();
             seen.left

@@ -9,6 +9,16 @@ use eframe::egui::{self, Key, RichText};
 pub(crate) enum Command {
     NextTool,
     Undo,
+    Redo,
+    Withdraw,
+    FocusTool,
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Light,
+    FullScreen,
     Reset,
     Microscope,
     Bone,
@@ -30,7 +40,15 @@ pub(crate) enum Command {
 pub(crate) const KEYS: &[(Key, Command, &str)] = &[
     (Key::N, Command::NextTool, "Next tool"),
     (Key::U, Command::Undo, "Undo the last stroke"),
+    (Key::Y, Command::Redo, "Redo the stroke"),
+    (Key::X, Command::Withdraw, "Draw the tool back"),
     (Key::R, Command::Reset, "Reset the view"),
+    (Key::D, Command::FocusTool, "Centre the tool"),
+    (Key::F2, Command::Front, "Front"),
+    (Key::F3, Command::Back, "Back"),
+    (Key::F4, Command::Left, "Left"),
+    (Key::F5, Command::Right, "Right"),
+    (Key::F6, Command::Top, "Top"),
     (Key::M, Command::Microscope, "Microscope"),
     (Key::B, Command::Bone, "Skull"),
     (Key::T, Command::Brain, "Brain"),
@@ -41,6 +59,8 @@ pub(crate) const KEYS: &[(Key, Command, &str)] = &[
     (Key::P, Command::Picture, "Save a picture of the window"),
     (Key::V, Command::Film, "Save every picture of the window"),
     (Key::L, Command::LargeType, "Large type"),
+    (Key::I, Command::Light, "Light or dark"),
+    (Key::F11, Command::FullScreen, "Full screen"),
     #[cfg(feature = "sound")]
     (Key::Z, Command::Mute, "No sound"),
     (Key::F1, Command::Help, "Keys"),
@@ -50,12 +70,14 @@ pub(crate) const KEYS: &[(Key, Command, &str)] = &[
 ];
 
 /// Mouse actions, and keys that are not in [`KEYS`].
-const REST: [(&str, &str); 8] = [
-    ("left drag", "Moves the tool; with Shift tilts it"),
-    ("wheel", "Pushes the tool in or pulls it out; with Ctrl zooms"),
-    ("right drag", "Turns the view"),
+const REST: [(&str, &str); 10] = [
+    ("pointer", "The tool flies over what is under it"),
+    ("left button", "Lowers the tool and pushes; dragged, slides; with Shift tilts the shaft"),
+    ("wheel", "Pushes the tool in or pulls it out, finely; with Ctrl zooms to the pointer"),
+    ("right drag", "Orbits the view"),
+    ("middle drag", "Pans the view; so does Shift + right drag"),
     ("arrows, Page Up and Down", "Move the tool by half a millimetre"),
-    ("+ and -", "Zoom"),
+    ("+ and -, 1 to 9", "Zoom; take a tool"),
     ("Space, held", "Drills"),
     ("Space", "In a replay: runs or stands still"),
     ("[ and ]", "In a replay: to the event before and after"),
@@ -64,6 +86,11 @@ const REST: [(&str, &str); 8] = [
 /// The commands whose keys were pressed.
 pub(crate) fn pressed(input: &egui::InputState) -> impl Iterator<Item = Command> {
     KEYS.iter().filter(|(key, ..)| input.key_pressed(*key)).map(|(_, command, _)| *command)
+}
+
+/// Name of a command.
+pub(crate) fn name(command: Command) -> &'static str {
+    KEYS.iter().find(|(_, c, _)| *c == command).map_or("", |(.., words)| words)
 }
 
 /// Button label of a command with its key.

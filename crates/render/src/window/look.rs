@@ -39,6 +39,15 @@ const ACROSS: [(&str, Option<Vec3>); 4] =
 /// Ratio of the target's distance to the eye distance, for comfort.
 const EYES_AWAY: f32 = 30.0;
 
+/// Share of the microscope's field in which the tool moves without the view.
+const QUIET: f32 = 0.4;
+
+/// Looks at the camera's target from a direction of the patient.
+fn turn(camera: &mut Camera, towards_eye: Vec3) {
+    let Camera { target, distance_mm, fov_rad, .. } = *camera;
+    *camera = Camera { fov_rad, ..Camera::viewed_from(target, towards_eye, distance_mm) };
+}
+
 impl Section {
     const FIRST: Self = Self { across: 0, offset_mm: 0.0, bone: true };
 
@@ -108,6 +117,11 @@ impl Look {
                 }
             }
             Command::Microscope => self.change_camera(camera),
+            Command::Front => turn(camera, Vec3::Y),
+            Command::Back => turn(camera, Vec3::NEG_Y),
+            Command::Left => turn(camera, Vec3::NEG_X),
+            Command::Right => turn(camera, Vec3::X),
+            Command::Top => turn(camera, Vec3::Z),
             _ => (),
         }
     }
@@ -120,13 +134,34 @@ impl Look {
         }
     }
 
+    /// Whether there is a microscope.
+    pub fn has_microscope(&self) -> bool {
+        self.other.is_some()
+    }
+
+    /// Moves the microscope's view after the tool's tip.
+    pub fn follow(&self, camera: &mut Camera, tip: Vec3) {
+        if self.microscope && tip.is_finite() {
+            let way = tip - camera.target;
+            let still_mm = QUIET * camera.distance_mm * (0.5 * camera.fov_rad).tan();
+            camera.target += way - way.clamp_length_max(still_mm);
+        }
+    }
+
     /// The camera that a reset restores.
     pub fn home(&self, orbit: Camera, microscope: Option<Camera>) -> Camera {
         microscope.filter(|_| self.microscope).unwrap_or(orbit)
     }
 
-    /// The switches in the panel.
+    /// The switches in the panel, and the standard views.
     pub fn show(&mut self, ui: &mut egui::Ui, camera: &mut Camera) {
+        ui.horizontal_wrapped(|ui| {
+            for command in [Command::Front, Command::Back, Command::Left, Command::Right, Command::Top] {
+                if ui.button(label(command)).on_hover_text("looks from this side of the patient").clicked() {
+                    self.react(command, camera);
+                }
+            }
+        });
         ui.horizontal_wrapped(|ui| {
             ui.checkbox(&mut self.bone, label(Command::Bone));
             ui.checkbox(&mut self.brain, label(Command::Brain));
@@ -206,6 +241,22 @@ mod tests {
             [round(), round(), round()],
             [Some((StereoLook::SideBySide, 10.0)), Some((StereoLook::Anaglyph, 10.0)), None]
         );
+    }
+
+    #[test]
+    fn standard_views_look_from_the_patients_side_and_the_microscope_follows_the_tool() {
+        let mut camera = Camera::viewed_from(Vec3::ONE, Vec3::Y, 200.0);
+        let scope = Camera { fov_rad: 0.2, ..camera };
+        let mut look = Look::with(Some(scope));
+        look.react(Command::Left, &mut camera);
+        assert!((camera.view(1.0).forward - Vec3::X).length() < 1e-5, "from the patient's left, RAS");
+        assert_eq!((camera.target, camera.distance_mm), (Vec3::ONE, 200.0));
+        let tip = Vec3::new(30.0, 0.0, 0.0);
+        look.follow(&mut camera, tip);
+        assert_eq!(camera.target, Vec3::ONE, "the orbiting camera does not");
+        look.react(Command::Microscope, &mut camera);
+        look.follow(&mut camera, tip);
+        assert!((camera.target.distance(tip) - QUIET * 200.0 * 0.1f32.tan()).abs() < 1e-3);
     }
 
     #[test]

@@ -3,11 +3,16 @@
 //! # Practice
 //! | input | does |
 //! |---|---|
-//! | left drag | moves the tool on the plane of the picture; with Shift tilts its shaft |
-//! | wheel | pushes the tool in or pulls it out along the line of sight; with Ctrl zooms |
-//! | right drag | circles the camera around its target |
+//! | pointer | the tool flies over what is under it |
+//! | left button | lowers the tool, runs it, pushes at the set feed; a drag slides along |
+//! | Shift + left drag | tilts the shaft |
+//! | wheel | pushes the tool in or pulls it out along its shaft; with Ctrl zooms to the pointer |
+//! | right drag; middle drag or Shift + right drag | orbits; pans |
 //! | Space (held) | the drill's pedal |
-//! | N, U | the next tool; takes the last stroke back |
+//! | 1 to 9, N | takes a tool; the next tool |
+//! | U, Y, X | undoes a stroke; redoes it; draws the tool back |
+//! | D, F2 to F6 | centres the view on the tool; views from the front, back, left, right, top |
+//! | I, F11 | light or dark; full screen |
 //! | arrows, Page Up, Page Down | move the tool by half a millimetre |
 //! | + and -, R | zoom; back to the first view |
 //! | M | the microscope: a narrow field down on the opening |
@@ -20,54 +25,89 @@
 //!
 //! The picture stays on the device: egui shows the renderer's own texture. Where that is impossible
 //! (a GL device, a device that cannot present on this display, or rendering on the processor) the
-//! window opens a second device and every picture is copied to it. Resolution is lowered when
-//! pictures take longer than a tenth of a second, and raised again when there is time.
+//! window opens a second device and every picture is copied to it. While something moves,
+//! resolution follows the frame time; at rest the picture is sharp, and its edges are smoothed.
 //!
 //! # When not to use it
 //! Without a display: [`run`] returns an error and all arguments, so that the session can continue
 //! headless.
 
+mod aids;
+mod answers;
 mod app;
 mod banner;
 mod capture;
 mod draws;
+mod guide;
+mod host;
 mod input;
 mod keys;
 mod look;
 #[cfg(feature = "sound")]
 mod loudspeaker;
+mod page;
 mod palette;
 mod panel;
 mod panel_text;
 mod plot;
+mod pointer;
 mod quality;
+mod surface;
 #[cfg(any(feature = "sound", test))]
 mod synthesis;
 #[cfg(test)]
 mod tests;
 mod timeline;
+mod tool_icon;
 
 pub use capture::Capture;
-pub use draws::Draws;
+pub use draws::{Draws, Refined};
+pub use host::{Host, Offers, Shown, Stage, open, stage};
 pub use input::WindowInput;
+pub use page::{Amount, Button, Choosable, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
+pub use surface::{Ray, SurfaceHit};
 
 use crate::{Camera, Frame, Image, Renderer};
-use std::cell::RefCell;
+use std::any::Any;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use trepan_geometry::Pose;
 use trepan_gpu::Gpu;
 
 /// The session behind the window. Called on the window's thread, once per picture; must not wait.
-pub trait Session {
+pub trait Session: Any {
     /// Processes the user's input and returns the panel.
     fn update(&mut self, input: &WindowInput) -> Panel;
 
     /// The frame to draw, seen by `camera`.
     fn frame(&self, camera: Camera) -> Frame<'_>;
 
+    /// The first surface that a ray meets from outside.
+    fn surface(&self, _ray: &Ray) -> Option<SurfaceHit> {
+        None
+    }
+
     /// Receives a screenshot of the whole window.
     fn capture(&mut self, what: Capture, picture: Image);
+}
+
+impl Session for Box<dyn Session + Send> {
+    fn update(&mut self, input: &WindowInput) -> Panel {
+        (**self).update(input)
+    }
+
+    fn frame(&self, camera: Camera) -> Frame<'_> {
+        (**self).frame(camera)
+    }
+
+    fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        (**self).surface(ray)
+    }
+
+    fn capture(&mut self, what: Capture, picture: Image) {
+        (**self).capture(what, picture);
+    }
 }
 
 /// Initial state of the window.
@@ -136,43 +176,48 @@ where
 {
     let shared = renderer.device().filter(|gpu| gpu.can_be_shared()).cloned();
     let lent: Lent<S, D> = Rc::new(RefCell::new(Some(Shared { session, renderer, shown: false, fault: None })));
-    let result = display().and_then(|()| open_somehow(title, shared.as_ref(), &lent, start));
+    let shown = Rc::new(Cell::new(false));
+    let create = |device: Option<&Gpu>| -> Box<dyn eframe::App> {
+        shown.set(true);
+        Box::new(app::Window::new(lent.clone(), start, device.is_none()))
+    };
+    let opened = display().and_then(|()| open_somehow(title, shared.as_ref(), start.size, &create, &shown));
     let back = lent.borrow_mut().take();
     let Some(Shared { session, renderer, fault, .. }) = back else {
         unreachable!("only this line takes what was lent")
     };
-    Closed { session, renderer, result: fault.map_or(result, |why| Err(WindowError::Failed(why))) }
+    Closed { session, renderer, result: fault.map_or(opened, |why| Err(WindowError::Failed(why))) }
 }
 
+/// Makes the application of a window on a device, or on a device of its own.
+type Create<'a> = dyn Fn(Option<&Gpu>) -> Box<dyn eframe::App> + 'a;
+
 /// Opens the window on the rendering device, or on a separate device if that cannot present.
-fn open_somehow<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
-where
-    S: Session + 'static,
-    D: Draws + 'static,
-{
-    let shown = || lent.borrow().as_ref().is_some_and(|shared| shared.shown);
-    match open(title, gpu, lent, start) {
-        Err(WindowError::Failed(why)) if gpu.is_some() && !shown() => {
-            let again = open(title, None, lent, start);
-            if again.is_ok() || shown() { again } else { Err(WindowError::Failed(why)) }
+/// `shown` is set once the application is made.
+fn open_somehow(
+    title: &str,
+    gpu: Option<&Gpu>,
+    size: [f32; 2],
+    create: &Create<'_>,
+    shown: &Cell<bool>,
+) -> Result<(), WindowError> {
+    match open_on(title, gpu, size, create) {
+        Err(WindowError::Failed(why)) if gpu.is_some() && !shown.get() => {
+            let again = open_on(title, None, size, create);
+            if again.is_ok() || shown.get() { again } else { Err(WindowError::Failed(why)) }
         }
         result => result,
     }
 }
 
 /// Opens the window and runs it until it is closed.
-fn open<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
-where
-    S: Session + 'static,
-    D: Draws + 'static,
-{
-    let (lent, copies) = (lent.clone(), gpu.is_none());
+fn open_on(title: &str, gpu: Option<&Gpu>, size: [f32; 2], create: &Create<'_>) -> Result<(), WindowError> {
     let show = || {
-        let create: eframe::AppCreator<'_> = Box::new(move |context| {
-            context.egui_ctx.set_visuals(eframe::egui::Visuals::dark());
-            Ok(Box::new(app::Window::new(lent, start, copies)))
+        let create: eframe::AppCreator<'_> = Box::new(|context| {
+            context.egui_ctx.set_theme(eframe::egui::Theme::Dark);
+            Ok(create(gpu))
         });
-        eframe::run_native(title, options(gpu, &start), create)
+        eframe::run_native(title, options(gpu, size), create)
     };
     // A missing system library makes the windowing crate panic; the session must survive that.
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
@@ -193,8 +238,7 @@ pub fn display() -> Result<(), WindowError> {
     Ok(())
 }
 
-fn options(gpu: Option<&Gpu>, start: &Start) -> eframe::NativeOptions {
-    let [width, height] = start.size;
+fn options(gpu: Option<&Gpu>, [width, height]: [f32; 2]) -> eframe::NativeOptions {
     let mut options = eframe::NativeOptions {
         viewport: eframe::egui::ViewportBuilder::default()
             .with_inner_size([width, height])
@@ -214,7 +258,7 @@ fn options(gpu: Option<&Gpu>, start: &Start) -> eframe::NativeOptions {
     options
 }
 
-fn words(panic: &(dyn std::any::Any + Send)) -> String {
+fn words(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
     text.unwrap_or("no reason given").into()
 }

@@ -1,11 +1,13 @@
-//! The side panel: phase, force, rate, values, choices and buttons.
+//! The side panel: the task first, then tools and view; engineering is folded away.
 
+use super::answers::refusal;
+use super::guide::{FEEDS, Guide};
+use super::input::ViewAndTool;
 use super::keys::{Command, label};
 use super::look::Look;
-use super::palette::{GREEN, ORANGE, PALE, SKY};
+use super::palette::{GREEN, ORANGE, SKY};
 use super::plot::{Drawn, Trace};
-use super::{Choice, Panel};
-use crate::Camera;
+use super::{Choice, Panel, tool_icon};
 use eframe::egui::{self, Color32, RichText};
 
 /// The clicks in the panel.
@@ -35,74 +37,99 @@ impl Default for Traces {
     }
 }
 
-/// Shows the panel; returns the clicks. `filming` is whether screenshots are being recorded.
+/// Shows the panel, the task first; returns the clicks. `filming` is whether screenshots are being
+/// recorded.
 pub(crate) fn show(
     ui: &mut egui::Ui,
     panel: &Panel,
     traces: &mut Traces,
     look: &mut Look,
-    camera: &mut Camera,
+    hand: &mut ViewAndTool,
     filming: bool,
 ) -> Clicks {
     let mut clicks = Clicks::default();
-    ui.add_space(8.0);
-    ui.label(RichText::new(&panel.phase).size(22.0).strong());
-    ui.label(RichText::new(format!("case {}", panel.case)).color(PALE));
-    ui.label(RichText::new(&panel.hint).size(14.0).color(PALE));
-    ui.separator();
+    // All of it scrolls: nothing is cut off on a small screen.
     egui::ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
-        plots(ui, panel, traces);
-        values(ui, panel);
+        ui.add_space(8.0);
+        ui.label(RichText::new(&panel.phase).size(22.0).strong());
+        ui.label(RichText::new(format!("case {}", panel.case)).weak());
+        ui.label(RichText::new(&panel.hint).size(14.0));
         ui.separator();
-        buttons(ui, panel, &mut clicks);
+        force(ui, panel, traces);
+        grid(ui, "task", &panel.task, 16.0);
+        ui.separator();
+        buttons(ui, panel, look, &mut clicks);
         for (at, choice) in panel.choices.iter().enumerate() {
             clicks.chosen = options(ui, choice).map(|option| [at, option]).or(clicks.chosen);
         }
+        if panel.by_hand {
+            by_mouse(ui, &mut hand.guide);
+        }
         ui.separator();
-        look.show(ui, camera);
+        look.show(ui, &mut hand.camera);
         ui.separator();
         if filming {
             ui.label(RichText::new("every picture of the window is saved").strong().color(ORANGE));
         }
-        ui.horizontal_wrapped(|ui| {
-            for command in [Command::Picture, Command::Film, Command::LargeType, Command::Help, Command::Quit] {
-                if ui.button(label(command)).clicked() {
-                    clicks.commands.push(command);
-                }
-            }
+        ui.horizontal_wrapped(|ui| window_buttons(ui, &mut clicks));
+        let engineering = egui::CollapsingHeader::new("Engineering").default_open(false);
+        engineering.show(ui, |ui| {
+            rate(ui, panel, traces);
+            grid(ui, "values", &panel.values, 13.0);
         });
     });
     clicks
 }
 
-fn plots(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
-    let Traces { force, rate } = traces;
-    let heading = |text: String| RichText::new(text).size(18.0).color(Color32::WHITE);
-    ui.label(heading(format!("Force  {:.2} N", panel.force_n)));
-    force.show(ui, Drawn { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
-    let most = force.most();
-    let note = format!("last {SECONDS_SHOWN:.0} s, most {most:.2} N, limit {:.1} N", panel.force_limit_n);
-    ui.label(RichText::new(note).small());
-    if panel.rate_hz > 0.0 {
-        ui.label(heading(format!("Rate  {:.0} Hz", panel.rate_hz)));
-        rate.show(ui, Drawn { name: "rate", height: 50.0, mark: panel.wanted_rate_hz.into(), colour: GREEN });
-    }
-    ui.separator();
-}
-
-fn values(ui: &mut egui::Ui, panel: &Panel) {
-    egui::Grid::new("values").num_columns(2).striped(true).show(ui, |ui| {
-        for (name, value) in &panel.values {
-            ui.label(name);
-            ui.label(RichText::new(value).monospace());
-            ui.end_row();
+fn window_buttons(ui: &mut egui::Ui, clicks: &mut Clicks) {
+    for (command, why) in [
+        (Command::Picture, "into the session's folder"),
+        (Command::Film, "into the session's folder, until it is pressed again"),
+        (Command::LargeType, "larger letters and controls"),
+        (Command::Light, "bright rooms, or dark ones"),
+        (Command::FullScreen, "without the frame of the window"),
+        (Command::Help, "all keys and what the mouse does"),
+        (Command::Quit, "ends the session and keeps its report"),
+    ] {
+        if ui.button(label(command)).on_hover_text(why).clicked() {
+            clicks.commands.push(command);
         }
-    });
+    }
 }
 
-fn buttons(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
+fn heading(ui: &mut egui::Ui, text: String) {
+    ui.label(RichText::new(text).size(18.0).strong());
+}
+
+fn force(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
+    heading(ui, format!("Force  {:.2} N", panel.force_n));
+    traces.force.show(ui, Drawn { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
+    let most = traces.force.most();
+    let note = format!("last {SECONDS_SHOWN:.0} s, most {most:.2} N, limit {:.1} N", panel.force_limit_n);
+    ui.label(RichText::new(note).small()).on_hover_text("what your hand would feel on a device with force");
+}
+
+fn rate(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
+    if panel.rate_hz > 0.0 {
+        heading(ui, format!("Rate  {:.0} Hz", panel.rate_hz));
+        traces.rate.show(ui, Drawn { name: "rate", height: 50.0, mark: panel.wanted_rate_hz.into(), colour: GREEN });
+    }
+}
+
+fn grid(ui: &mut egui::Ui, id: &str, values: &[(String, String)], size: f32) {
+    for (name, value) in values {
+        ui.push_id((id, name), |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(RichText::new(name).size(size));
+                ui.label(RichText::new(value).size(size).monospace().strong());
+            });
+        });
+    }
+}
+
+fn buttons(ui: &mut egui::Ui, panel: &Panel, look: &Look, clicks: &mut Clicks) {
     let width = ui.available_width();
-    let wide = |text: RichText, height: f32| egui::Button::new(text).min_size(egui::vec2(width, height));
+    let wide = |text: RichText, height: f32| egui::Button::new(text).wrap().min_size(egui::vec2(width, height));
     if panel.by_hand {
         let name = if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" };
         let mut pedal = wide(RichText::new(name).strong(), 32.0);
@@ -110,30 +137,60 @@ fn buttons(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
             pedal = wide(RichText::new(name).strong().color(Color32::BLACK), 32.0).fill(ORANGE);
         }
         // A widget that only senses clicks counts as released after 0.8 s.
-        clicks.pedal = ui.add(pedal.sense(egui::Sense::drag())).is_pointer_button_down_on();
-        let next = format!("{}: {}", label(Command::NextTool), panel.tool);
-        for (command, name) in [(Command::NextTool, next), (Command::Undo, label(Command::Undo))] {
-            if ui.add(wide(RichText::new(name), 26.0)).clicked() {
-                clicks.commands.push(command);
-            }
+        let held = ui.add_enabled(panel.no_drill.is_none(), pedal.sense(egui::Sense::drag()));
+        clicks.pedal = held.is_pointer_button_down_on();
+        if let Some(why) = &panel.no_drill {
+            held.on_disabled_hover_text(why);
         }
     }
-    if ui.add(wide(RichText::new(label(Command::Reset)), 26.0)).clicked() {
-        clicks.commands.push(Command::Reset);
+    let next = format!("{}: {}", label(Command::NextTool), panel.tool);
+    let of_hand = [Command::NextTool, Command::Undo, Command::Redo, Command::Withdraw];
+    let of_view = [Command::Reset, Command::FocusTool];
+    for command in of_hand.into_iter().filter(|_| panel.by_hand).chain(of_view) {
+        let name = if command == Command::NextTool { next.clone() } else { label(command) };
+        let why_not = refusal(command, panel, look);
+        let mut button = ui.add_enabled(why_not.is_none(), wide(RichText::new(name), 26.0));
+        if let Some(why) = why_not {
+            button = button.on_disabled_hover_text(why);
+        }
+        if button.clicked() {
+            clicks.commands.push(command);
+        }
     }
     for (at, action) in panel.actions.iter().enumerate() {
         let key = action.key.map_or_else(String::new, |key| format!(" ({})", key.to_uppercase()));
         let name = RichText::new(format!("{}{key}", action.name));
         let button = if action.on { wide(name.color(Color32::BLACK), 26.0).fill(SKY) } else { wide(name, 26.0) };
-        if ui.add(button).clicked() {
+        let mut button = ui.add_enabled(action.why_not.is_none(), button);
+        if let Some(why) = &action.why_not {
+            button = button.on_disabled_hover_text(why);
+        }
+        if button.clicked() {
             clicks.actions |= 1 << at;
         }
     }
 }
 
+/// What the left button does.
+fn by_mouse(ui: &mut egui::Ui, guide: &mut Guide) {
+    ui.checkbox(&mut guide.drills, "The left button drills")
+        .on_hover_text("Held down on the skull, the left button lowers the tool, runs it and pushes it in");
+    let feed = egui::Slider::new(&mut guide.feed_mm_s, FEEDS).logarithmic(true).fixed_decimals(1).text("feed, mm/s");
+    ui.add(feed).on_hover_text("How fast the held button pushes the tool along its shaft");
+}
+
 /// The options of a choice; returns the one clicked.
 fn options(ui: &mut egui::Ui, choice: &Choice) -> Option<usize> {
     let mut clicked = None;
+    if choice.tools.len() == choice.options.len() && !choice.tools.is_empty() {
+        for (at, (tool, (name, open))) in choice.tools.iter().zip(&choice.options).enumerate() {
+            let chosen = at == choice.chosen;
+            if tool_icon::show(ui, tool, at + 1, name, (*open || chosen, chosen)) && !chosen {
+                clicked = Some(at);
+            }
+        }
+        return clicked;
+    }
     ui.horizontal_wrapped(|ui| {
         ui.label(format!("{}:", choice.name));
         for (at, (name, open)) in choice.options.iter().enumerate() {

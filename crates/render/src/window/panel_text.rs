@@ -1,7 +1,7 @@
 //! The data that a session sends to its window.
 
 use std::sync::Arc;
-use trepan_geometry::Vec3;
+use trepan_geometry::{Tool, Vec3};
 
 /// Contents of the panel beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,10 +32,20 @@ pub struct Panel {
     pub choices: Vec<Choice>,
     /// Further actions.
     pub actions: Vec<Action>,
-    /// Named values, in order.
+    /// Values of the task, with units: bone left, distance to the brain.
+    pub task: Vec<(String, String)>,
+    /// Why nothing can be undone now; `None` where it can.
+    pub no_undo: Option<String>,
+    /// Why nothing can be redone now; `None` where it can.
+    pub no_redo: Option<String>,
+    /// Why the present tool does not drill; `None` where it does.
+    pub no_drill: Option<String>,
+    /// Further values, in order, with units.
     pub values: Vec<(String, String)>,
-    /// Active warnings, shown in a vermilion banner.
+    /// Active warnings, the most urgent first; it is shown in a vermilion banner.
     pub warnings: Vec<String>,
+    /// Notices on device and machine, shown small.
+    pub technical: Vec<String>,
     /// Information such as a pause, shown in a blue banner.
     pub news: Vec<String>,
     /// Position in time, for a session that can be replayed.
@@ -55,6 +65,8 @@ pub struct Choice {
     pub options: Vec<(String, bool)>,
     /// Index of the selected option.
     pub chosen: usize,
+    /// The tools that the options stand for, shown with icons and number keys; else empty.
+    pub tools: Vec<Tool>,
 }
 
 /// A session-specific button.
@@ -66,6 +78,8 @@ pub struct Action {
     pub key: Option<char>,
     /// Whether it is on, for a switch.
     pub on: bool,
+    /// Why it does nothing now; `None` where it works.
+    pub why_not: Option<String>,
 }
 
 /// The position in time of a replayable session.

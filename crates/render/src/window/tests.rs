@@ -9,6 +9,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 use std::sync::Arc;
+use trepan_geometry::Tool;
 use trepan_gpu::{GpuError, Texture};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -139,7 +140,7 @@ impl Bench {
     }
 
     fn closes(&self) -> bool {
-        self.commands().contains(&ViewportCommand::Close)
+        self.window.state().is_over()
     }
 }
 
@@ -155,12 +156,16 @@ fn the_panel_shows_the_sessions_data() {
         rate_hz: 999.0,
         wanted_rate_hz: 1000.0,
         values,
+        task: vec![("bone left".into(), "4.2 mm".into())],
         ..Panel::default()
     };
-    let bench = Bench::with(panel);
-    let words =
-        ["case composite", "Craniotomy", "drag the burr", "Force  1.25 N", "limit 3.3 N", "Rate  999 Hz", "3 / 4"];
+    let mut bench = Bench::with(panel);
+    let words = ["case composite", "Craniotomy", "drag the burr", "Force  1.25 N", "limit 3.3 N", "4.2 mm"];
     assert!(words.iter().all(|words| bench.shows(words)));
+    assert!(!bench.shows("Rate  999 Hz") && !bench.shows("3 / 4"), "folded away");
+    bench.click("Engineering");
+    bench.window.run_steps(20);
+    assert!(bench.shows("Rate  999 Hz") && bench.shows("3 / 4"));
     assert!(!bench.shows("Hold to drill") && !bench.shows("Next tool"), "nobody's hand is on it");
 }
 
@@ -175,7 +180,9 @@ fn a_warning_is_a_wide_vermilion_banner_and_goes_when_it_is_over() {
     let mut bench = Bench::with(Panel::default());
     assert!(!bench.shows("WARNING") && !wide(&bench));
     bench.set_panel(|panel| panel.warnings = vec!["The dura is 1 mm away".into(), "Force is clamped".into()]);
-    assert!(bench.shows("WARNING   The dura is 1 mm away") && bench.shows("Force is clamped") && wide(&bench));
+    assert!(bench.shows("WARNING   The dura is 1 mm away") && wide(&bench));
+    assert!(!bench.shows("Force is clamped"), "the most urgent stands alone");
+    bench.set_panel(|panel| panel.technical = vec!["The device is warm".into()]);
     let letters = bench.window.get_by_label_contains("The dura is 1 mm away").rect();
     assert!(letters.height() > 20.0 && letters.top() < 40.0, "{letters}");
     bench.set_panel(|panel| (panel.warnings, panel.news) = (Vec::new(), vec!["The teacher pauses".into()]));
@@ -260,7 +267,7 @@ fn the_microscope_looks_straight_down_and_back_again() {
 #[test]
 fn an_open_option_is_chosen_and_a_closed_one_is_not() {
     let options = [("burr 4 mm", true), ("burr 6 mm", true), ("perforator", false)].map(|(n, o)| (n.to_string(), o));
-    let choice = Choice { name: "Tool".into(), options: options.into(), chosen: 0 };
+    let choice = Choice { name: "Tool".into(), options: options.into(), ..Choice::default() };
     let mut bench = Bench::with(Panel { choices: vec![Choice::default(), choice], ..Panel::default() });
     assert_eq!(bench.click("burr 6 mm").chosen, Some([1, 1]));
     bench.window.step();
@@ -271,7 +278,7 @@ fn an_open_option_is_chosen_and_a_closed_one_is_not() {
 
 #[test]
 fn the_sessions_own_actions_have_buttons_and_keys() {
-    let action = |name: &str, key| Action { name: name.into(), key: Some(key), on: false };
+    let action = |name: &str, key| Action { name: name.into(), key: Some(key), ..Action::default() };
     let actions = vec![action("Show my tool", 'g'), action("Pause the trainee", 'j')];
     let mut bench = Bench::with(Panel { actions, ..Panel::default() });
     assert_eq!(bench.press(Key::J).actions, 2);
@@ -402,4 +409,189 @@ fn arrow_keys_move_the_tool_unless_a_slider_has_them() {
     bench.window.step();
     assert_eq!(bench.last_input().world_from_tool.translation, moved);
     assert!(bench.last_request().slices.level_hu > level);
+}
+
+#[test]
+fn every_key_answers_on_screen_whether_it_applies_or_not() {
+    let tools = vec![Tool::burr(3.0), Tool::probe(2.0)];
+    let options = vec![("burr".into(), true), ("probe".into(), false)];
+    let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
+    let flap = Action { name: "Lift".into(), key: Some('f'), why_not: Some("no flap".into()), ..Action::default() };
+    let refused = Some("nothing yet".to_string());
+    let by_hand = Panel {
+        by_hand: true,
+        choices: vec![choice.clone()],
+        actions: vec![flap],
+        no_undo: refused.clone(),
+        no_redo: refused.clone(),
+        no_drill: refused,
+        ..Panel::default()
+    };
+    // Keys that move tool or view at once, or belong to the focused control.
+    let moves = "ArrowDown ArrowLeft ArrowRight ArrowUp PageUp PageDown Plus Minus Equals Tab Enter Home End";
+    for panel in [by_hand, Panel { choices: vec![choice], ..Panel::default() }] {
+        let mut bench = Bench::with(panel);
+        for &key in Key::ALL {
+            if moves.split(' ').any(|name| key == Key::from_name(name).unwrap()) {
+                continue;
+            }
+            bench.window.state_mut().answers = Default::default();
+            bench.press(key);
+            let now = bench.window.state().drawn_at;
+            let answer = bench.window.state().answers.standing(now).map(String::from);
+            assert!(answer.as_ref().is_some_and(|text| bench.shows(text)), "{key:?} does not answer: {answer:?}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_used_is_grey_and_does_nothing() {
+    let panel = Panel { by_hand: true, no_undo: Some("no stroke".into()), ..Panel::default() };
+    let mut bench = Bench::with(panel);
+    assert!(!bench.click("Undo the last stroke (U)").undo && !bench.press(Key::U).undo);
+    assert!(bench.shows("Undo the last stroke: no stroke"));
+    bench.set_panel(|panel| panel.no_undo = None);
+    assert!(bench.click("Undo the last stroke (U)").undo && bench.press(Key::Y).redo);
+}
+
+#[test]
+fn number_keys_take_tools() {
+    let tools = vec![Tool::burr(3.0), Tool::craniotome(), Tool::probe(2.0)];
+    let options = ["burr", "craniotome", "probe"].map(|name| (name.to_string(), true)).into();
+    let choices = vec![Choice { name: "Tool".into(), options, chosen: 0, tools }];
+    let mut bench = Bench::with(Panel { by_hand: true, choices, ..Panel::default() });
+    assert_eq!(bench.press(Key::Num2).chosen, Some([0, 1]));
+    assert_eq!(bench.press(Key::Num1).chosen, None);
+    assert!(bench.shows("the burr is in the hand"));
+    assert_eq!(bench.click("3  probe").chosen, Some([0, 2]));
+    bench.press(Key::Num7);
+    assert!(bench.shows("there is no tool number 7"));
+}
+
+#[test]
+fn no_control_is_out_of_reach_on_small_and_large_screens() {
+    let marks =
+        [(2.0, "burr near the brain", true)].map(|(at_s, text, warning)| Mark { at_s, text: text.into(), warning });
+    let timeline =
+        Timeline { at_s: 3.0, length_s: 10.0, ready_s: 5.0, running: false, speed: 1.0, marks: marks.into() };
+    let tools = vec![Tool::burr(3.0), Tool::craniotome(), Tool::perforator()];
+    let options = ["burr 6 mm", "craniotome", "perforator 11 mm"].map(|name| (name.to_string(), true)).into();
+    let choices = vec![Choice { name: "Tool".into(), options, chosen: 0, tools }];
+    let full = Panel { by_hand: true, choices, timeline: Some(timeline), ..Panel::default() };
+    for (size, scale) in [
+        ([1024.0, 700.0], 1.0),
+        ([1024.0, 700.0], 2.0),
+        ([1280.0, 800.0], 1.5),
+        ([3840.0, 2160.0], 1.0),
+        ([3840.0, 2160.0], 2.0),
+    ] {
+        let mut bench = Bench::with(full.clone());
+        let points = egui::vec2(size[0], size[1]) / scale;
+        bench.window.set_size(points);
+        bench.window.run_steps(6);
+        let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, points);
+        use egui::accesskit::Role;
+        let controls = [Role::Button, Role::CheckBox, Role::Slider];
+        for role in controls {
+            for node in bench.window.query_all_by_role(role) {
+                let rect = node.rect();
+                let reached = rect.left() >= -1.0 && rect.right() <= screen.right() + 1.0 && rect.width() > 4.0;
+                assert!(reached, "{node:?} at {rect:?} of {screen:?}");
+            }
+        }
+        bench.window.event(Event::PointerMoved(egui::pos2(points.x - 40.0, 0.4 * points.y)));
+        for _ in 0..60 {
+            let (unit, phase, source) =
+                (egui::MouseWheelUnit::Point, egui::TouchPhase::Move, egui::MouseWheelSource::Unknown);
+            let (delta, modifiers) = (egui::vec2(0.0, -200.0), Default::default());
+            bench.window.event(Event::MouseWheel { unit, delta, phase, source, modifiers });
+            bench.window.step();
+        }
+        bench.window.run_steps(10);
+        let last = bench.window.get_by_label("Quit (Q)").rect();
+        assert!(screen.contains_rect(last), "the last button is at {last:?} of {screen:?}");
+    }
+}
+
+/// Actions of a page under test, by the name of its control.
+fn page() -> Page<&'static str> {
+    let choosable = |name: &str, open| Choosable { name: name.into(), hint: "why".into(), open };
+    let amount = Amount { name: "flap, mm".into(), value: 10.0, range: [0.0, 90.0], step: 1.0 };
+    let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
+    let picture = Picture {
+        name: "head".into(),
+        image: (1, image),
+        height: 200.0,
+        letters: vec![([0.1, 0.5], "R".into())],
+        clicked: Some(|_| "clicked"),
+        dragged: None,
+    };
+    let many = (0..30).map(|n| Item::button(format!("case {n}"), "a case", "case")).collect();
+    Page {
+        title: "Title".into(),
+        columns: vec![
+            many,
+            vec![
+                Item::Choice(
+                    "Device".into(),
+                    vec![choosable("mouse", true), choosable("haply", false)],
+                    1,
+                    |_| "device",
+                ),
+                Item::Field("Name".into(), String::new(), "nobody".into(), |_| "name"),
+                Item::Amount(amount, |_| "flap"),
+                Item::Curve("curve".into(), vec![1.0, 3.0, 2.0]),
+            ],
+            vec![
+                Item::Picture(picture),
+                Item::Alert("careful".into()),
+                Item::Table(vec![vec!["a".into(), "b".into()]]),
+            ],
+        ],
+        foot: vec![Item::main("Start", "begins", "start"), Item::closed("Check", "open a CT first")],
+        escape: Some("back"),
+        ..Page::default()
+    }
+}
+
+/// A page in a window of some size: its harness gathers the actions.
+fn shown(size: [f32; 2], scale: f32) -> Harness<'static, Vec<&'static str>> {
+    let mut textures = page::Textures::default();
+    let show = move |ui: &mut egui::Ui, done: &mut Vec<&'static str>| {
+        let drawn = egui::CentralPanel::default().show(ui, |ui| page::show(ui, &page(), &mut textures));
+        done.extend(drawn.inner);
+    };
+    let size = egui::vec2(size[0], size[1]) / scale;
+    let mut harness = Harness::builder().with_size(size).with_pixels_per_point(scale).build_ui_state(show, Vec::new());
+    harness.run_steps(3);
+    harness
+}
+
+#[test]
+fn the_controls_of_a_page_do_what_they_say_and_closed_ones_nothing() {
+    let mut harness = shown([1280.0, 800.0], 1.0);
+    for name in ["Start", "Check", "mouse", "haply", "case 3"] {
+        harness.get_by_label(name).click();
+        harness.run_steps(2);
+    }
+    assert_eq!(*harness.state(), ["start", "device", "case"]);
+    harness.key_press(Key::Escape);
+    harness.run_steps(2);
+    assert_eq!(harness.state().last(), Some(&"back"));
+}
+
+#[test]
+fn no_control_of_a_page_is_cut_off_beside_the_window() {
+    for (size, scale) in
+        [([1024.0, 700.0], 1.0), ([1280.0, 800.0], 1.0), ([1920.0, 1080.0], 1.0), ([1280.0, 800.0], 2.0)]
+    {
+        let harness = shown(size, scale);
+        let width = size[0] / scale;
+        for name in ["case 0", "case 29", "mouse", "haply", "Start", "Check", "careful"] {
+            let area = harness.get_by_label(name).rect();
+            assert!(area.left() >= 0.0 && area.right() <= width, "{name} at {size:?} and scale {scale}: {area}");
+        }
+        let foot = harness.get_by_label("Start").rect();
+        assert!(foot.bottom() <= size[1] / scale, "the foot stays in view: {foot}");
+    }
 }

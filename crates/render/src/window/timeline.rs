@@ -14,7 +14,7 @@ pub(crate) fn show(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut asked = keys(ui, timeline);
     egui::Panel::bottom("timeline").show(ui, |ui| {
         ui.add_space(4.0);
-        ui.horizontal(|ui| asked = buttons(ui, timeline).or(asked));
+        ui.horizontal_wrapped(|ui| asked = buttons(ui, timeline).or(asked));
         asked = asked.or(bar(ui, timeline));
         ui.add_space(6.0);
     });

@@ -7,9 +7,9 @@ use glam::DAffine3;
 use std::path::Path;
 use trepan_mesh::lattice::{self, Fine, LabelledMesh};
 use trepan_volume::{
-    AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig,
-    VoxelVolume, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register, resample, room_for,
-    room_for_voxels, skull_only,
+    AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, Islands, MaskError, ReadError,
+    RegistrationConfig, VoxelVolume, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register,
+    resample, room_for, room_for_voxels, skull_only,
 };
 
 /// Margin of the brain's grids around the brain, mm.
@@ -160,12 +160,12 @@ pub(super) fn find_brain(
 }
 
 /// Resamples a CT to cubic voxels, by a spline whose isosurface has no creases, and keeps the
-/// largest piece of bone.
+/// largest piece of bone. Also returns what was loose.
 pub(super) fn make_skull(
     ct: &VoxelVolume<i16>,
     recipe: &Recipe,
     isovalue_hu: i16,
-) -> Result<VoxelVolume<i16>, SessionError> {
+) -> Result<(VoxelVolume<i16>, Islands), SessionError> {
     let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
     room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
         let text =
@@ -173,14 +173,14 @@ pub(super) fn make_skull(
         SessionError::Usage(text)
     })?;
     let mut skull = resample(ct, &grid, Interpolation::Cubic, AIR_HU);
-    skull_only(&mut skull, isovalue_hu);
+    let islands = skull_only(&mut skull, isovalue_hu);
     // Beside a step the spline reaches above the CT: what is bone, the CT itself says.
     if ![ct, &skull].into_iter().all(|volume| volume.data.iter().any(|&hu| hu >= isovalue_hu)) {
         return Err(SessionError::Case(format!(
             "no voxel of the CT reaches {isovalue_hu} HU: there is no bone; give --isovalue-hu"
         )));
     }
-    Ok(skull)
+    Ok((skull, islands))
 }
 
 /// Builds the tissue classes on a grid around the brain.

@@ -8,6 +8,7 @@ use crate::error::SessionError;
 use crate::models::{self, Facts, ModelRequest, Models};
 use crate::options::{Options, Patient};
 use crate::program::Program;
+use crate::progress::Progress;
 use crate::recipe::Recipe;
 use crate::tissue_class::TissueClass;
 use std::path::Path;
@@ -20,8 +21,9 @@ pub(crate) fn open_case(
     options: &Options,
     built_in: Inputs,
     request: ModelRequest,
-    card: impl FnOnce() -> bool,
+    (progress, card): (&Progress, impl FnOnce() -> bool),
 ) -> Result<(Case, Models), SessionError> {
+    progress.next("looking at the images")?;
     if let Some(folder) = &options.case {
         let case = fitting(program, folder::load(folder)?)?;
         let classes = case.brain.as_ref().map(|brain| &brain.classes.data);
@@ -33,7 +35,7 @@ pub(crate) fn open_case(
     let (inputs, mut models) = (inputs(&options.patient, built_in), None);
     check_forbidden(options, |class| class == TissueClass::Brain || inputs.tissues.iter().any(|t| t.class == class))?;
     let requested = recipe(&options.patient);
-    let case = import::open_by(program, &inputs, &requested, &Cache::of(&options.patient)?, |pending| {
+    let case = import::open_by(program, (&inputs, &requested), &Cache::of(&options.patient)?, progress, |pending| {
         let facts = pending.facts;
         let settled = models
             .insert(request.settle(&facts, card, |scene, rows, element| pending.case_errors(scene, rows, element))?);
@@ -43,6 +45,28 @@ pub(crate) fn open_case(
     })?;
     let unsettled = || SessionError::Internal("a case without models".into());
     Ok((case, models.ok_or_else(unsettled)?))
+}
+
+/// Opens a case to look at, without the models of a session. It is the named folder, the cached
+/// case of this hash, else the images in voxels and tetrahedra of preset `usual`.
+pub(crate) fn case_to_check(
+    program: Program,
+    options: &Options,
+    built_in: Inputs,
+    hash: &str,
+    progress: &Progress,
+) -> Result<Case, SessionError> {
+    progress.next("looking at the images")?;
+    if let Some(folder) = &options.case {
+        return folder::load(folder);
+    }
+    let cache = Cache::of(&options.patient)?;
+    let known = Some(hash).filter(|hash| !hash.is_empty()).and_then(|hash| cache.find(hash));
+    if let Some(Ok(case)) = known.map(|folder| folder::load(&folder)) {
+        return Ok(case);
+    }
+    let recipe = recipe(&options.patient);
+    import::open_by(program, (&inputs(&options.patient, built_in), &recipe), &cache, progress, |_| Ok(recipe))
 }
 
 /// Refuses a class of `--forbid` that the case does not contain.
@@ -95,7 +119,7 @@ pub(crate) fn plan_case(
         }
         None => {
             let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of(patient)?);
-            let mut pending = PendingCase::of(program, &inputs, &recipe, &cache)?;
+            let mut pending = PendingCase::of(program, (&inputs, &recipe), &cache, &Progress::default())?;
             let (facts, notes) = (pending.facts, pending.notes.clone());
             let models =
                 request.settle(&facts, card, |scene, rows, element| pending.case_errors(scene, rows, element))?;

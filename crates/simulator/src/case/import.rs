@@ -24,6 +24,7 @@ use crate::measure::tissue::{Fineness, Shape};
 use crate::measure::{CaseErrors, Sight};
 use crate::models::Facts;
 use crate::program::Program;
+use crate::progress::Progress;
 use crate::recipe::Recipe;
 use glam::DAffine3;
 use serde::de::DeserializeOwned;
@@ -37,18 +38,18 @@ use trepan_volume::{VoxelVolume, bone_isovalue, overlap, skull_only};
 
 /// Opens a case: from the cache if it was built before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
-    open_by(program, inputs, recipe, cache, |_| Ok(*recipe))
+    open_by(program, (inputs, recipe), cache, &Progress::default(), |_| Ok(*recipe))
 }
 
 /// Opens a case whose voxel size and tetrahedra are chosen by `choose` when the images are known.
 pub(super) fn open_by(
     program: Program,
-    inputs: &Inputs,
-    requested: &Recipe,
+    (inputs, requested): (&Inputs, &Recipe),
     cache: &Cache,
+    progress: &Progress,
     choose: impl FnOnce(&mut PendingCase) -> Result<Recipe, SessionError>,
 ) -> Result<Case, SessionError> {
-    let mut pending = PendingCase::of(program, inputs, requested, cache)?;
+    let mut pending = PendingCase::of(program, (inputs, requested), cache, progress)?;
     let recipe = choose(&mut pending)?;
     let PendingCase { facts, notes, key, images, opening, mut stages, .. } = pending;
     let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
@@ -62,7 +63,7 @@ pub(super) fn open_by(
     let images = images.map_or_else(|| read(inputs, requested, &mut stages), Ok)?;
     let mut case = build(program, inputs, (images, opening), &recipe, &mut stages)?;
     (case.name, case.hash, case.images) = (name, hash, hashes);
-    stages.next("caching the case");
+    stages.next("caching the case")?;
     // The facts are cached only now: images from which no case can be built leave nothing.
     match cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {
         Ok(()) if cached::<CachedFacts>(cache, &key, FACTS).is_none() => {
@@ -105,12 +106,12 @@ impl<'a> PendingCase<'a> {
     /// Reads the images unless their properties are cached.
     pub fn of(
         program: Program,
-        inputs: &'a Inputs,
-        requested: &'a Recipe,
+        (inputs, requested): (&'a Inputs, &'a Recipe),
         cache: &'a Cache,
+        progress: &Progress,
     ) -> Result<Self, SessionError> {
         let key = key_of_images(program, inputs, requested, cache)?;
-        let mut stages = ImportStages::new(7);
+        let mut stages = ImportStages::new(7, progress);
         let (CachedFacts { facts, notes }, images) = match cached(cache, &key, FACTS) {
             Some(cached) => (cached, None),
             None => {
@@ -138,7 +139,7 @@ impl<'a> PendingCase<'a> {
         if self.images.is_none() {
             self.images = Some(read(self.inputs, self.requested, &mut self.stages)?);
         }
-        self.stages.next("measuring model errors in this case");
+        self.stages.next("measuring model errors in this case")?;
         let sight =
             self.images.as_ref().map(|images| sight(self.program, images, self.requested, scene)).transpose()?;
         let (opening, sight) = sight.flatten().unzip();
@@ -195,7 +196,7 @@ fn sight(
     let classes = images.mask.as_ref().map(cropped).transpose()?;
     let inside = classes.as_ref().map(Inside::of);
     let of_bone = |ct: &VoxelVolume<i16>| {
-        let drawn = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
+        let (drawn, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
         let bone = bone_of(&drawn, images.isovalue_hu)?;
         let opening = Opening::of_patient(&bone, inside.as_ref(), recipe.opening)?;
         let mut skull = Skull { ct: ct.clone(), isovalue: images.isovalue_hu };
@@ -268,22 +269,22 @@ struct Images {
 
 fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<Images, SessionError> {
     let mut notes = Vec::new();
-    stages.next("reading the CT");
+    stages.next("reading the CT")?;
     let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut notes)).transpose()?;
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
-    stages.next("reading the MRI");
+    stages.next("reading the MRI")?;
     let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, recipe.mri_series, &mut notes)).transpose()?;
     let (mut fit, mut ct_from_mri) = (Fit::new(), DAffine3::IDENTITY);
     if let (Some(ct), Some(mri)) = (&ct, &mut mri) {
         if recipe.register {
-            stages.next("registering the MRI to the CT");
+            stages.next("registering the MRI to the CT")?;
             fit.add(ct, mri, isovalue_hu);
             ct_from_mri = registered(ct, mri, &mut notes)?;
         }
         overlap(ct, mri).map_err(|fault| SessionError::Case(fault.to_string()))?;
         fit.add(ct, mri, isovalue_hu);
     }
-    stages.next("segmenting the brain");
+    stages.next("segmenting the brain")?;
     let space = ct.as_ref().map(|ct| Space { ct, isovalue_hu, registered: recipe.register });
     if let Some((space, mri)) = space.as_ref().zip(mri.as_ref()) {
         notes.extend(space.check_mri(mri)?);
@@ -306,9 +307,11 @@ fn build(
     stages: &mut ImportStages,
 ) -> Result<Case, SessionError> {
     let Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
-    stages.next("resampling the skull");
-    let skull = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
-    stages.next("planning the opening");
+    stages.next("resampling the skull")?;
+    let made = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
+    notes.extend(made.as_ref().and_then(|(_, islands)| islands.note()));
+    let skull = made.map(|(skull, _)| skull);
+    stages.next("planning the opening")?;
     let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
     let on_skull = |(ct, skull)| match known {
         Some(opening) => opening.on(&bone_of(skull, isovalue_hu)?, classes.is_some()),
@@ -319,7 +322,7 @@ fn build(
         Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
         found => found?,
     };
-    stages.next("meshing the brain");
+    stages.next("meshing the brain")?;
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
     let fineness = Fineness::stepped(recipe.tets, recipe.halvings);
     let at = |opening: Opening| fineness.fine(opening.brain(), -Vec3::from(opening.inward));

@@ -5,7 +5,7 @@ pub(crate) mod anchors;
 pub(crate) mod cache;
 pub(crate) mod choice;
 mod fit;
-mod folder;
+pub(crate) mod folder;
 pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod opening;

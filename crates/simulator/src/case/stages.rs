@@ -1,5 +1,7 @@
 //! Progress of an import: shows the running stage, and the share of each stage at the end.
 
+use crate::error::SessionError;
+use crate::progress::Progress;
 use crate::run::clock::Clock;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
@@ -8,25 +10,27 @@ use std::time::Duration;
 /// Progress bar that records the duration of each stage.
 pub(crate) struct ImportStages {
     bar: ProgressBar,
+    progress: Progress,
     clock: Clock,
     /// Name and start time of each stage, ms.
     began: Vec<(&'static str, f64)>,
 }
 
 impl ImportStages {
-    /// Shows a bar for `count` stages.
-    pub fn new(count: u64) -> Self {
+    /// Shows a bar for `count` stages, and reports them.
+    pub fn new(count: u64, progress: &Progress) -> Self {
         let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} {elapsed}");
         let bar = ProgressBar::new(count).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(120));
-        Self { bar, clock: Clock::start(), began: Vec::new() }
+        Self { bar, progress: progress.clone(), clock: Clock::start(), began: Vec::new() }
     }
 
-    /// Begins a stage, which ends the one before.
-    pub fn next(&mut self, what: &'static str) {
+    /// Begins a stage, which ends the one before; an error if loading was cancelled.
+    pub fn next(&mut self, what: &'static str) -> Result<(), SessionError> {
         self.began.push((what, self.clock.now_ms()));
         self.bar.inc(1);
         self.bar.set_message(what);
+        self.progress.next(what)
     }
 
     /// Hides the bar during a call that prints.

@@ -1,7 +1,9 @@
 //! Output files of a session: summary, scores, report page, drilled skull.
 
 pub(crate) mod chart;
+pub(crate) mod debrief;
 pub(crate) mod drilled;
+pub(crate) mod kept;
 pub(crate) mod output;
 pub(crate) mod page;
 pub(crate) mod plan_comparison;

@@ -2,6 +2,7 @@
 
 use crate::error::SessionError;
 use crate::program::Program;
+use crate::report::debrief::Debrief;
 use crate::report::drilled;
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
@@ -17,23 +18,28 @@ use trepan_mesh::{isosurface, stl};
 use trepan_volume::{BoneVolume, VoxelVolume, nifti};
 
 /// Files that a session writes into its folder, besides pictures.
-const FILES: [&str; 7] =
+const NAMES: [&str; 7] =
     ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled-fine.nii.gz", "drilled.stl", RECORDING];
 /// Default name of the recording; `--record` gives another.
 pub(crate) const RECORDING: &str = "session.mcap";
+/// Largest number of letters of a session's name in the name of its folder.
+const MOST_LETTERS: usize = 60;
 /// Folder of the pictures.
 const FRAMES: &str = "frames";
 
 /// Whether a folder holds files of a session.
 pub(crate) fn holds_session(out: &Path) -> bool {
-    FILES.iter().any(|name| out.join(name).exists())
+    NAMES.iter().any(|name| out.join(name).exists())
 }
 
-/// Returns a new folder below `trepan-out/PROGRAM`, named after the time (UTC).
-pub(crate) fn dated(program: Program) -> PathBuf {
+/// Returns a new folder below `ROOT/PROGRAM`, named after the time (UTC) and the session's name.
+pub(crate) fn dated(program: Program, root: Option<&Path>, name: Option<&str>) -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-    let place = Path::new("trepan-out").join(program.name());
-    let (first, mut nth) = (place.join(date_and_time(now)), 1);
+    let place = root.unwrap_or(Path::new("trepan-out")).join(program.name());
+    let fit = |c: char| if c.is_alphanumeric() { c } else { '-' };
+    let name = name.map(|name| name.trim().chars().map(fit).take(MOST_LETTERS).collect::<String>());
+    let name = name.filter(|name| !name.is_empty()).map_or_else(String::new, |name| format!("-{name}"));
+    let (first, mut nth) = (place.join(date_and_time(now) + &name), 1);
     let mut folder = first.clone();
     while folder.exists() {
         nth += 1;
@@ -59,7 +65,7 @@ fn date_and_time(seconds: u64) -> String {
 /// Folder of a session that is being written. Dropped before [`keep`](Self::keep), it removes the
 /// session's files; a recording that can be opened is kept, up to its last whole chunk.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct Files {
     out: PathBuf,
     record: PathBuf,
     /// Folders that this session created, the deepest first.
@@ -67,16 +73,16 @@ pub(crate) struct Place {
     kept: bool,
 }
 
-impl Place {
+impl Files {
     /// Creates the folder and its folder for pictures, and removes the files of an older session.
     pub fn make(out: &Path, record: &Path) -> Result<Self, SessionError> {
         let missing = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let made = missing.map(PathBuf::from).collect();
-        let place = Self { out: out.into(), record: record.into(), made, kept: false };
+        let files = Self { out: out.into(), record: record.into(), made, kept: false };
         let failed = SessionError::output(out);
         fs::create_dir_all(out.join(FRAMES)).map_err(failed)?;
-        place.clear()?;
-        Ok(place)
+        files.clear()?;
+        Ok(files)
     }
 
     /// Keeps the files: the session is complete.
@@ -89,7 +95,7 @@ impl Place {
         let frames = self.out.join(FRAMES);
         let pictures = fs::read_dir(&frames).into_iter().flatten().flatten();
         let pictures = pictures.map(|entry| entry.path()).filter(|path| path.extension() == Some(OsStr::new("png")));
-        let files = FILES.iter().map(|name| self.out.join(name)).chain([self.record.clone()]);
+        let files = NAMES.iter().map(|name| self.out.join(name)).chain([self.record.clone()]);
         for path in files.filter(|path| path.exists()).chain(pictures) {
             fs::remove_file(&path).map_err(SessionError::output(&path))?;
         }
@@ -97,7 +103,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Files {
     fn drop(&mut self) {
         if self.kept {
             return;
@@ -143,13 +149,13 @@ pub(crate) fn write(
     recording: &Recording,
     summary: &Summary,
     outcome: &Outcome,
-    shots: &[Shot],
+    (debrief, shots): (&Debrief, &[Shot]),
 ) -> Result<(), SessionError> {
     let json =
         serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
     whole(&out.join("scores.csv"), scores(summary).as_bytes())?;
-    let page = page::html(summary, outcome, recording, shots)?;
+    let page = page::html(summary, outcome, recording, (debrief, shots))?;
     whole(&out.join("report.html"), page.as_bytes())
 }
 
@@ -196,7 +202,9 @@ mod tests {
         assert_eq!(date_and_time(0), "1970-01-01T00-00-00");
         assert_eq!(date_and_time(951_827_696), "2000-02-29T12-34-56");
         assert_eq!(date_and_time(1_795_418_102), "2026-11-23T07-15-02");
-        assert!(dated(Program::Brain).starts_with("trepan-out/brain"));
+        assert!(dated(Program::Brain, None, None).starts_with("trepan-out/brain"));
+        let named = dated(Program::Brain, Some(Path::new("kept")), Some(" second try/..\u{e9} "));
+        assert!(named.starts_with("kept/brain") && named.to_str().unwrap().ends_with("-second-try---é"), "{named:?}");
     }
 
     #[test]
@@ -204,12 +212,12 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("a/b");
         let half = || {
-            let place = Place::make(&out, &out.join(RECORDING)).unwrap();
+            let files = Files::make(&out, &out.join(RECORDING)).unwrap();
             for name in ["summary.json", RECORDING, "frames/frame-00001.png"] {
                 fs::write(out.join(name), "half").unwrap();
             }
             assert!(holds_session(&out));
-            place
+            files
         };
         drop(half());
         assert!(!home.path().join("a").exists());

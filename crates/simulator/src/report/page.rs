@@ -6,7 +6,8 @@ use crate::error::SessionError;
 use crate::force_scale::ForceScale;
 use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
-use crate::report::chart::{Chart, Curve, histogram, over_time};
+use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
+use crate::report::debrief::Debrief;
 use crate::report::summary::Summary;
 use crate::run::Outcome;
 use base64::Engine;
@@ -53,12 +54,14 @@ pub(crate) fn html(
     summary: &Summary,
     outcome: &Outcome,
     recording: &Recording,
-    shots: &[Shot],
+    (debrief, shots): (&Debrief, &[Shot]),
 ) -> Result<String, SessionError> {
     let shot = |Shot { caption, png }: &Shot| json!({ "caption": caption, "png": STANDARD.encode(png) });
     let context = json!({
         "title": format!("Trepan {}: {}", summary.app, summary.case),
         "summary": summary,
+        "debrief": debrief,
+        "learning": learning(debrief)?,
         "parts": parts(&summary.models),
         "ingredients": KEYS.iter().map(|key| format!("{} {}", key.name, key.value(&summary.models.ingredients))).collect::<Vec<_>>(),
         "bands": summary.bands.sentences(),
@@ -70,6 +73,16 @@ pub(crate) fn html(
         "tables": tables(summary)?,
     });
     render("report.html", &context)
+}
+
+/// Draws the learning curves: each measure over the number of the session.
+fn learning(debrief: &Debrief) -> Result<Vec<Chart>, SessionError> {
+    let chart = |(name, values): &(String, Vec<f64>)| {
+        let points = values.iter().enumerate().map(|(at, value)| (at as f64 + 1.0, *value)).collect();
+        let svg = traces(["session", name], &[Curve { name: "sessions", points }])?;
+        Ok(Chart::new(format!("{name}, session by session; the last is this one"), svg))
+    };
+    debrief.curves.iter().map(chart).collect()
 }
 
 /// Describes the models that ran, and why they were chosen.

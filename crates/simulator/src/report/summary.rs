@@ -21,6 +21,12 @@ pub struct Summary {
     pub app: String,
     /// Name of the case, without the patient's name.
     pub case: String,
+    /// Who operated; `null` if that was not said.
+    pub person: Option<String>,
+    /// Name of the lesson; `null` without one.
+    pub lesson: Option<String>,
+    /// Name of the session; `null` without one.
+    pub name: Option<String>,
     /// Name of the device.
     pub device: String,
     /// Models that ran, and why they were chosen.

@@ -7,4 +7,5 @@ mod keep;
 mod notice_text;
 pub(crate) mod picture;
 pub(crate) mod player;
+mod raycast;
 pub(crate) mod window;

@@ -10,29 +10,35 @@ use trepan_render::window::{Choice, Panel, Sound};
 /// Time for which a notice is shown, ms.
 const NEWS_MS: f64 = 4000.0;
 
-/// Warnings of harm to the patient, which sound the alarm; the others concern device and machine.
+/// Warnings of harm to the patient, which sound the alarm, the most urgent first.
 const DANGERS: [Warning; 6] = [
+    Warning::BrainTouched,
+    Warning::BrainPressed,
     Warning::BreakThrough,
     Warning::BreachSoon,
     Warning::BrainNear,
-    Warning::BrainTouched,
-    Warning::BrainPressed,
     Warning::ForbiddenNear,
 ];
+
+/// Warnings of the operation without harm, after those.
+const CARE: [Warning; 2] = [Warning::BoneThin, Warning::DrillStalled];
 
 /// Returns the panel's contents that are common to all sessions.
 pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
+    let brain_mm = match view.brain_distance_mm {
+        mm if mm.is_finite() => format!("{mm:.1} mm"),
+        _ => "no brain here".into(),
+    };
+    let task = [value("tool to brain", brain_mm), value("bone removed", format!("{:.0} mm³", view.removed_mm3))];
     let values = [
         value("force of the task", format!("{:.1} N", view.task_n)),
         value("scale", view.force_scale.text()),
         value("depth in bone", format!("{:.2} mm", view.depth_mm[0])),
         value("depth in tissue", format!("{:.2} mm", view.depth_mm[1])),
-        value("tool to brain", format!("{:.1} mm", view.brain_distance_mm)),
-        value("bone removed", format!("{:.0} mm³", view.removed_mm3)),
-        value("late / held ticks", format!("{late} / {held}")),
+        value("late / held ticks", format!("{late} / {held} ticks")),
         value("time", format!("{:.1} s", view.time_ms * 1e-3)),
     ];
     let band = (sample.phase() == Phase::Brain && view.depth_mm[1] > 0.0).then(|| {
@@ -55,7 +61,11 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         force_limit_n: view.force_limit_n,
         choices: vec![tray(program, sample.slot)],
         values: values.into_iter().chain(band).chain(second).collect(),
-        warnings: active(view.warnings).map(|warning| warning.text().into()).collect(),
+        task: task.into(),
+        no_drill: (!sample.tool.kind.cuts())
+            .then(|| format!("the {} does not drill: take a tool for bone with its number key", called(&sample.tool))),
+        warnings: urgent(view.warnings).map(|warning| warning.text().into()).collect(),
+        technical: technical(view.warnings).map(|warning| warning.text().into()).collect(),
         news: news(view),
         ..Panel::default()
     }
@@ -72,12 +82,22 @@ fn news(view: &View) -> Vec<String> {
 /// Returns the choice of tools, with the present one selected.
 fn tray(program: Program, slot: usize) -> Choice {
     let options = program.tray().iter().map(|tool| (called(tool), true)).collect();
-    Choice { name: "Tool".into(), options, chosen: slot }
+    Choice { name: "Tool".into(), options, chosen: slot, tools: program.tray().to_vec() }
 }
 
 /// Returns the active warnings.
 fn active(bits: u32) -> impl Iterator<Item = Warning> {
     Warning::ALL.into_iter().filter(move |warning| bits & (1 << *warning as u32) != 0)
+}
+
+/// Returns the active warnings of the operation, the most urgent first.
+fn urgent(bits: u32) -> impl Iterator<Item = Warning> {
+    DANGERS.into_iter().chain(CARE).filter(move |warning| active(bits).any(|other| other == *warning))
+}
+
+/// Returns the active warnings of device and machine.
+fn technical(bits: u32) -> impl Iterator<Item = Warning> {
+    active(bits).filter(|warning| !DANGERS.contains(warning) && !CARE.contains(warning))
 }
 
 fn in_words(notice: Notice) -> String {
@@ -90,9 +110,9 @@ pub(crate) fn hint(phase: Phase, by_hand: bool) -> &'static str {
     match (phase, by_hand) {
         (_, false) => "the operation runs by itself",
         (Phase::Craniotomy, true) => {
-            "drag the tool to the skull, hold Space to drill, turn the wheel to push; U undoes the last stroke"
+            "point at the skull, hold the left button to drill there; let go to draw back; U undoes the last stroke"
         }
-        (Phase::Brain, true) => "press the tool on the brain: drag it, turn the wheel to push",
+        (Phase::Brain, true) => "point at the brain and hold the left button to press it; let go to draw back",
     }
 }
 
@@ -115,7 +135,10 @@ mod tests {
         let panel = |bits| panel("composite", Program::Integrated, &view(bits));
         assert!(panel(bit(Warning::BrainTouched)).sound.alarm);
         let late = panel(bit(Warning::TissueLate));
-        assert!(!late.sound.alarm && late.warnings == [Warning::TissueLate.text()]);
+        assert!(!late.sound.alarm && late.warnings.is_empty() && late.technical == [Warning::TissueLate.text()]);
+        let many = panel(bit(Warning::BoneThin) | bit(Warning::BrainTouched) | bit(Warning::BreachSoon));
+        let order = [Warning::BrainTouched, Warning::BreachSoon, Warning::BoneThin].map(Warning::text);
+        assert!(many.warnings == order && many.technical.is_empty(), "the most urgent first");
         assert_eq!((late.sound.spindle, late.sound.load), (0.5, 0.5));
         assert_eq!((late.choices[0].chosen, late.choices[0].options[1].0.as_str()), (1, "burr 4 mm"));
     }

@@ -1,4 +1,4 @@
-//! The main thread of a session with a window: renders the newest state and passes on user input.
+//! A session in the window: renders the newest state and passes on user input.
 //!
 //! # Practice
 //! Window and loops never wait for each other. With the mouse as device, the haptic loop reads the
@@ -6,6 +6,7 @@
 
 use crate::SessionError;
 use crate::program::Program;
+use crate::progress::Progress;
 use crate::report::page::Shot;
 use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
 use crate::run::stop::Stop;
@@ -16,11 +17,13 @@ use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
 use crate::show::picture::{Album, camera, frame, microscope, snap};
+use crate::show::raycast::Raycast;
+use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_link::wire::TeacherRecord;
-use trepan_render::window::{self, Action, Capture, Leash, Panel, Start, WindowInput};
+use trepan_render::window::{self, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter};
 
 /// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
@@ -31,6 +34,10 @@ const REQUEST_S: f64 = 0.1;
 
 /// Session data for the window.
 pub(crate) struct Opened<'a> {
+    /// The window.
+    pub stage: &'a Stage,
+    /// Progress of loading, which ends when the session is in the window.
+    pub progress: &'a Progress,
     /// Patient, plan and program.
     pub table: &'a SessionSetup,
     /// Name of the case, without the patient's name.
@@ -39,6 +46,10 @@ pub(crate) struct Opened<'a> {
     pub out: &'a Path,
     /// Requested rate of the haptic loop, Hz.
     pub rate_hz: f32,
+    /// Place in the tray of the tool that a hand with the mouse begins with.
+    pub slot: usize,
+    /// The lesson, if there is one.
+    pub guide: Option<Guide>,
 }
 
 /// What a live session and a replay show alike.
@@ -108,6 +119,10 @@ struct Show {
     ghost: Option<Pose>,
     requests: Requests,
     rate: Rate,
+    raycast: Raycast,
+    /// Whether no flap is planned.
+    no_flap: bool,
+    guide: Option<Guide>,
 }
 
 /// Recent requests, each with the time at which it expires, s.
@@ -115,6 +130,16 @@ struct Show {
 struct Requests(Vec<(Buttons, f64)>);
 
 impl Requests {
+    /// Requests the first tool; the one in the hand already needs no request.
+    fn first(slot: usize) -> Self {
+        Self((slot > 0).then(|| (Buttons::slot(slot), f64::INFINITY)).into_iter().collect())
+    }
+
+    /// Drops the request of the first tool once it is in the hand.
+    fn settle(&mut self, slot: usize) {
+        self.0.retain(|(button, until)| until.is_finite() || *button != Buttons::slot(slot));
+    }
+
     /// Adds new requests and returns all that are active at a time, s.
     fn at(&mut self, seconds: f64, new: impl Iterator<Item = Buttons>) -> Buttons {
         self.0.retain(|(_, until)| seconds < *until);
@@ -160,15 +185,18 @@ pub(crate) fn show(
         company,
         markers: Vec::new(),
         ghost: None,
-        requests: Requests::default(),
+        requests: Requests::first(opened.slot),
         rate: Rate::default(),
+        raycast: Raycast::of(opened.table),
+        no_flap: opened.table.plan.outline.is_empty(),
+        guide: opened.guide.clone(),
     };
     let (show, album) = run(show, painter, opened, view);
     show.shown.finish(album)
 }
 
 /// Runs a session in a window, with a picture before and one after it.
-pub(crate) fn run<S: window::Session + 'static>(
+pub(crate) fn run<S: window::Session + Send>(
     session: S,
     mut painter: Painter,
     opened: &Opened<'_>,
@@ -181,7 +209,8 @@ pub(crate) fn run<S: window::Session + 'static>(
     let detail = opened.table.models.setup.picture.detail as f32;
     let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
     let counted = Counted { session, pictures: 0, seconds: [0.0; 2] };
-    let closed = window::run(&format!("Trepan {}", opened.table.program.name()), painter, counted, start);
+    opened.progress.run();
+    let closed = opened.stage.run(painter, counted, start);
     let (mut painter, Counted { session, pictures, seconds: [from, to] }) = (closed.renderer, closed.session);
     (album.frames, album.seconds) = (album.frames + pictures, to - from);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
@@ -213,6 +242,10 @@ impl<S: window::Session> window::Session for Counted<S> {
         self.session.frame(camera)
     }
 
+    fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.session.surface(ray)
+    }
+
     fn capture(&mut self, what: Capture, picture: Image) {
         self.session.capture(what, picture);
     }
@@ -229,13 +262,24 @@ impl window::Session for Show {
         if let Some(soft) = &mut self.inputs.soft {
             self.positions.clone_from(&soft.latest().0.positions);
         }
+        self.requests.settle(self.view.sample.slot);
+        self.raycast.follow(&self.positions, self.view.sample.state.tip());
         self.send_pose(input);
         let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
-        let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
+        let step = self.guide.as_mut().map(|guide| guide.follow(view));
+        let usual = || if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into();
+        let hint = step.unwrap_or_else(usual);
+        let flap = || Action {
+            name: "Lift the flap, or put it back".into(),
+            key: Some('f'),
+            why_not: self.no_flap.then(|| "no flap is planned: start with --flap and its diameter, mm".into()),
+            ..Action::default()
+        };
         let mut panel = self.shown.panel(view, by_hand);
         panel.warnings.extend(lesson.warnings);
+        self.raycast.describe(view, &mut panel);
         // A watcher reads that the other session has ended, and closes the window herself.
         let over = self.company.watching.as_ref().and_then(Watching::ended);
         let finished = match over {
@@ -247,7 +291,7 @@ impl window::Session for Show {
             panel.news = vec![format!("{text}: close the window (Q)")];
         }
         Panel {
-            hint: if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into(),
+            hint,
             by_hand,
             rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
             wanted_rate_hz: self.wanted_rate_hz,
@@ -264,6 +308,10 @@ impl window::Session for Show {
         Frame { overlay: Overlay { ghost, markers: &self.markers, ..frame.overlay }, ..frame }
     }
 
+    fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.raycast.cast(ray, &self.positions)
+    }
+
     fn capture(&mut self, what: Capture, picture: Image) {
         self.shown.keep(what, picture);
     }
@@ -276,6 +324,7 @@ impl Show {
         let buttons = [
             input.next_tool.then_some(Buttons::NEXT_TOOL),
             input.undo.then_some(Buttons::UNDO),
+            input.redo.then_some(Buttons::REDO),
             (input.actions & 1 != 0).then_some(Buttons::FLAP),
             input.chosen.map(|[_, slot]| Buttons::slot(slot)),
         ];
@@ -340,8 +389,12 @@ fn teach(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
     }
     teacher.send(input.world_from_tool);
     let flags = teacher.requests().flags;
-    let switch =
-        |(name, key, bit): (&str, char, u32)| Action { name: name.into(), key: Some(key), on: flags & bit != 0 };
+    let switch = |(name, key, bit): (&str, char, u32)| Action {
+        name: name.into(),
+        key: Some(key),
+        on: flags & bit != 0,
+        why_not: None,
+    };
     Lesson { actions: SWITCHES.map(switch).into(), ..Lesson::default() }
 }
 
@@ -386,6 +439,9 @@ mod tests {
             ghost: None,
             requests: Requests::default(),
             rate: Rate::default(),
+            raycast: Raycast::default(),
+            no_flap: true,
+            guide: None,
         };
         let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());
@@ -405,6 +461,7 @@ mod tests {
             pedal: false,
             next_tool: false,
             undo: false,
+            redo: false,
             chosen: None,
             actions: 0,
             playback: None,

@@ -22,7 +22,7 @@ pub(crate) fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, rea
     let step = 0.25 * bone.spacing_mm();
     let over = |mm: f32| density(bone, front + mm * direction) - f32::from(bone.isovalue());
     let (mut left, mut last) = (0.0, over(0.0));
-    let steps = (reach_mm / step).ceil().clamp(0.0, 256.0) as usize;
+    let steps = (reach_mm / step).ceil().clamp(0.0, 512.0) as usize;
     for i in 1..=steps {
         let (from, to) = ((i - 1) as f32 * step, i as f32 * step);
         let now = over(to);
@@ -37,7 +37,7 @@ pub(crate) fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, rea
 }
 
 /// Returns the trilinear density, HU.
-fn density(bone: &BoneVolume, point: Vec3) -> f32 {
+pub(crate) fn density(bone: &BoneVolume, point: Vec3) -> f32 {
     let grid = bone.grid_of(point);
     let low = grid.floor();
     let t = grid - low;

@@ -7,7 +7,7 @@
 //! same voxels. Bone under the isovalue at the flap's rim is not lifted. What the CT shows in the
 //! cut beside the flap goes with it: else the density between the two would leave a thin wall.
 
-use crate::stages::notice::What;
+use crate::stages::notice::{Hindrance, What};
 use glam::IVec3;
 use trepan_geometry::Buttons;
 use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, FlapState};
@@ -84,11 +84,23 @@ impl Flap {
     }
 
     /// Runs a tick, after the contact with bone; returns a notice. `cut`: bone was removed in this
-    /// tick, `free`: the tool touches nothing.
-    pub fn tick(&mut self, bone: &BoneVolume, buttons: Buttons, drilling: bool, cut: bool, free: bool) -> Option<What> {
+    /// tick, `hinders`: why the flap cannot be moved now.
+    pub fn tick(
+        &mut self,
+        bone: &BoneVolume,
+        buttons: Buttons,
+        (drilling, cut): (bool, bool),
+        hinders: Option<Hindrance>,
+    ) -> Option<What> {
         let pressed = buttons.has(Buttons::FLAP);
         let before = std::mem::replace(&mut self.was_requested, pressed);
-        let requested = pressed && !before && free && !drilling;
+        let hinders = hinders.or(self.moves().then_some(Hindrance::FlapMoves));
+        let refused = hinders.filter(|_| pressed && !before).map(What::FlapWaits);
+        let requested = pressed && !before && hinders.is_none();
+        self.advance(bone, (drilling, cut), requested).or(refused)
+    }
+
+    fn advance(&mut self, bone: &BoneVolume, (drilling, cut): (bool, bool), requested: bool) -> Option<What> {
         self.stroke |= cut;
         match self.at {
             State::Skull | State::Searched | State::Cut if drilling => {
@@ -185,7 +197,9 @@ mod tests {
         let search = FlapSearch::new(&bone, middle, 25.0, middle + 6.0 * Vec3::Z, middle - 6.0 * Vec3::Z);
         let mut flap = Flap::new(search);
         let run = |flap: &mut Flap, ticks: usize, buttons, drilling, cut| {
-            (0..ticks).filter_map(|_| flap.tick(&bone, buttons, drilling, cut, true)).collect::<Vec<_>>()
+            (0..ticks)
+                .filter_map(|_| flap.tick(&bone, buttons, (drilling, cut), drilling.then_some(Hindrance::Pedal)))
+                .collect::<Vec<_>>()
         };
         let none = Buttons(0);
         assert_eq!(run(&mut flap, 5, Buttons::FLAP, false, false), [What::FlapHangs]);

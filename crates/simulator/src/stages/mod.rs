@@ -1,6 +1,6 @@
 //! Bodies of the three loops, without clocks or threads.
 
-mod ahead;
+pub(crate) mod ahead;
 pub(crate) mod alarms;
 pub(crate) mod collision_step;
 mod drill;

@@ -66,10 +66,10 @@ impl Warning {
 
     fn texts(self) -> Texts {
         let (name, text, unit) = match self {
-            Self::BoneThin => ("bone-thin", "less than a millimetre of bone is left", "mm left"),
-            Self::BreakThrough => ("break-through", "the bone is about to give way", "mm left"),
-            Self::BrainNear => ("brain-near", "the drill is about to reach the brain", "mm away"),
-            Self::BrainTouched => ("brain-touched", "the drill touches the brain", "mm deep"),
+            Self::BoneThin => ("bone-thin", "less than a millimetre of bone is left: press lightly", "mm left"),
+            Self::BreakThrough => ("break-through", "the bone is about to give way: hold back", "mm left"),
+            Self::BrainNear => ("brain-near", "the drill is about to reach the brain: stop pushing", "mm away"),
+            Self::BrainTouched => ("brain-touched", "the drill touches the brain: draw it back", "mm deep"),
             Self::ForceLimit => ("force-limit", "the force is at the device's limit", "N wanted"),
             Self::TissueLate => {
                 ("tissue-late", "the collision result of the tissue is late, its force fades", "ms old")
@@ -79,9 +79,11 @@ impl Warning {
                 ("motors-warm", "the device's motors are warm, its force is reduced: press less", "N wanted")
             }
             Self::DrillStalled => ("drill-stalled", "the drill has stalled: press less", "N wanted"),
-            Self::BreachSoon => ("breach-soon", "at this feed the drill is through in a moment", "ms left"),
+            Self::BreachSoon => ("breach-soon", "at this feed the drill is through in a moment: slow down", "ms left"),
             Self::BrainPressed => ("brain-pressed", "the brain is pressed hard: press less", "N"),
-            Self::ForbiddenNear => ("forbidden-near", "a structure that must not be touched is close", "mm away"),
+            Self::ForbiddenNear => {
+                ("forbidden-near", "a structure that must not be touched is close: keep away", "mm away")
+            }
         };
         Texts { name, text, unit }
     }
@@ -110,6 +112,16 @@ pub enum What {
     Undone(f32),
     /// Undoing a stroke was requested and refused.
     NotUndone(Hindrance),
+    /// The stroke undone last was redone; the volume of bone removed again, mm³.
+    Redone(f32),
+    /// Redoing a stroke was requested and refused.
+    NotRedone(Hindrance),
+    /// A tool was requested while the present one touches something.
+    NotChanged,
+    /// Moving the flap was requested and is not possible now.
+    FlapWaits(Hindrance),
+    /// Moving a flap was requested where none is planned.
+    NoFlap,
     /// A tool was taken.
     Taken(Tool),
     /// A tool for the brain was requested before the bone was open.
@@ -150,6 +162,12 @@ pub enum Hindrance {
     FlapThere,
     /// No stroke is left to undo.
     NoStroke,
+    /// No stroke was undone since the last one.
+    NothingUndone,
+    /// The tool touches something.
+    Touches,
+    /// A stroke is being undone or redone.
+    UndoRuns,
     /// Earlier strokes are no longer stored.
     Forgotten,
 }
@@ -166,6 +184,9 @@ impl Hindrance {
             Self::FlapAway => "the flap was in its place at that stroke: put it back first",
             Self::FlapThere => "the flap was away at that stroke: lift it first",
             Self::NoStroke => "there is no stroke left",
+            Self::UndoRuns => "a stroke is being undone: wait a moment",
+            Self::NothingUndone => "no stroke was undone since the last one",
+            Self::Touches => "the tool touches something: draw it back first",
             Self::Forgotten => {
                 let room = format!("{MAX_STROKES} strokes, or {MAX_STROKE_BRICKS} blocks of bone that they changed");
                 return format!("earlier strokes are no longer stored: there is room for {room}");
@@ -202,6 +223,11 @@ impl Notice {
             What::Through => ("through", "the burr came through the bone".into()),
             What::Undone(mm3) => ("undo", format!("the last stroke is undone: {mm3:.1} mm3 of bone are back")),
             What::NotUndone(why) => ("refused", format!("no stroke is undone: {}", why.text())),
+            What::Redone(mm3) => ("redo", format!("the stroke is redone: {mm3:.1} mm3 of bone are gone again")),
+            What::NotRedone(why) => ("refused", format!("no stroke is redone: {}", why.text())),
+            What::NotChanged => ("refused", format!("the tool stays in the hand: {}", Hindrance::Touches.text())),
+            What::FlapWaits(why) => ("refused", format!("the flap stays: {}", why.text())),
+            What::NoFlap => ("refused", "no flap is planned: start with --flap and its diameter, mm".into()),
             What::NotOpen => ("refused", "the bone is not open: drill through it or lift the flap first".into()),
             What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
             What::FlapHangs => ("refused", "the flap is still attached to the skull: cut it free first".into()),

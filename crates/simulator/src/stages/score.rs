@@ -61,6 +61,9 @@ pub struct ScoreKeeper {
     /// Force of bone on the hand while it is cut, integrated over time, N s, and that time, s.
     #[serde(skip)]
     pub(crate) cutting: [f64; 2],
+    /// Time of undoing and redoing, ms.
+    #[serde(skip)]
+    undoing_ms: f64,
     #[serde(skip)]
     motion: Motion,
     #[serde(skip)]
@@ -91,9 +94,14 @@ impl ScoreKeeper {
     /// Adds a tick, weighted with the time since the last.
     pub fn add(&mut self, record: &TickRecord) {
         let since_s = self.last_ms.map_or(0.0, |last| 1e-3 * (record.time_ms - last));
-        let (force, seconds) = (record.wrench.force, since_s.clamp(0.0, MAX_TICK_S));
+        let undoes = record.has(TickRecord::UNDOING);
+        let (force, seconds) = (record.wrench.force, if undoes { 0.0 } else { since_s.clamp(0.0, MAX_TICK_S) });
         self.last_ms = Some(record.time_ms);
-        self.motion.add(record.time_ms, record.proxy.translation);
+        // Undoing takes no time: the motion goes on where it was.
+        self.undoing_ms += if undoes { 1e3 * since_s } else { 0.0 };
+        if !undoes {
+            self.motion.add(record.time_ms - self.undoing_ms, record.proxy.translation);
+        }
         (self.path_mm, self.idle_s) = (self.motion.path_mm, self.motion.idle_s);
         self.log_dimensionless_jerk = self.motion.log_dimensionless_jerk();
         self.tool_changes += u32::from(record.tool != self.tool);
@@ -136,6 +144,19 @@ impl ScoreKeeper {
 mod tests {
     use super::*;
     use trepan_geometry::{Pose, Quat, Wrench};
+
+    #[test]
+    fn undoing_costs_no_time() {
+        let score = |undoing: std::ops::Range<u16>| {
+            let mut keeper = ScoreKeeper::default();
+            for i in 0..300u16 {
+                let flags = if undoing.contains(&i) { TickRecord::UNDOING } else { 0 };
+                keeper.add(&TickRecord { time_ms: f64::from(i), flags, ..TickRecord::default() });
+            }
+            keeper.idle_s
+        };
+        assert!((score(0..0) - score(100..200) - 0.1).abs() < 0.021, "{} {}", score(0..0), score(100..200));
+    }
 
     #[test]
     fn a_known_path_gives_known_scores() {

@@ -24,6 +24,8 @@ pub(crate) enum Change {
     Taken,
     /// The request was refused: the bone is not open.
     Refused,
+    /// The request was refused: the present tool touches something.
+    Busy,
 }
 
 impl Tray {
@@ -55,8 +57,11 @@ impl Tray {
         let next = || request.0.then(|| (self.slot + 1) % slots).filter(|_| !before.0);
         let kind = || request.1.filter(|_| before.1 != request.1).and_then(|kind| self.of_kind(kind));
         let target = next().or_else(kind).or(request.2.filter(|slot| *slot < slots))?;
-        if target == self.slot || !free {
+        if target == self.slot {
             return None;
+        }
+        if !free {
+            return (before != request).then_some(Change::Busy);
         }
         let phase = Phase::of(&self.program.tray()[target]);
         if phase == Phase::Brain && self.phase() == Phase::Craniotomy && !open {
@@ -83,14 +88,15 @@ mod tests {
     fn tools_are_taken_by_turn_kind_or_slot_once_for_each_request() {
         let mut tray = Tray::new(Program::Integrated);
         let mut ask = |buttons, free, open| (tray.change(buttons, free, open), tray.slot());
-        assert_eq!(ask(Buttons::NEXT_TOOL, false, true), (None, 0), "touching");
+        assert_eq!(ask(Buttons::NEXT_TOOL, false, true), (Some(Change::Busy), 0), "touching");
         assert_eq!(ask(Buttons::NEXT_TOOL, true, true), (None, 0), "still held");
         ask(NONE, true, true);
         assert_eq!(ask(Buttons::NEXT_TOOL, true, true), (Some(Change::Taken), 1));
         assert_eq!(ask(Buttons::take(ToolKind::Burr), true, true), (Some(Change::Taken), 0), "the other burr");
         assert_eq!(ask(Buttons::take(ToolKind::Burr), true, true), (None, 0));
         assert_eq!(ask(Buttons::take(ToolKind::Aspirator), true, true), (None, 0), "not in the tray");
-        assert_eq!(ask(Buttons::slot(3), false, true), (None, 0));
+        assert_eq!(ask(Buttons::slot(3), false, true), (Some(Change::Busy), 0));
+        assert_eq!(ask(Buttons::slot(3), false, true), (None, 0), "reported once");
         assert_eq!(ask(Buttons::slot(3), true, true), (Some(Change::Taken), 3), "tried until free");
         assert_eq!(ask(Buttons::slot(14), true, true), (None, 3));
         assert_eq!(ask(Buttons::take(ToolKind::Spatula), true, true), (Some(Change::Taken), 5));

@@ -1,4 +1,4 @@
-//! Undoing strokes of the burr, the newest first, a few bricks per tick.
+//! Undoing and redoing strokes of the burr, a few bricks per tick.
 //!
 //! # Theory
 //! The bricks of a stroke are exchanged with their stored copies. Where a tool of either hand lies
@@ -6,8 +6,9 @@
 //! the tool in the way:
 //!
 //! ```text
-//! request ─→ returning ──(all bricks)──→ undone
-//!                └──(tool in the way)──→ leaving ─→ refused
+//! undo ─→ returning ──(all bricks)──→ undone
+//!             └──(tool in the way)──→ leaving ─→ refused
+//! redo ─→ redoing ──(all bricks)──→ redone
 //! ```
 //!
 //! # Practice
@@ -38,8 +39,12 @@ pub(crate) struct Stroke {
 pub(crate) enum Answer {
     /// The stroke is undone.
     Back(Stroke),
+    /// The stroke that was undone last is redone.
+    Again(Stroke),
     /// The request is refused.
     Not(Hindrance),
+    /// The request to redo is refused.
+    NotAgain(Hindrance),
 }
 
 /// Progress of undoing; the numbers count bricks.
@@ -48,6 +53,8 @@ enum State {
     Rest,
     /// Bricks restored so far.
     Returning(usize),
+    /// Bricks removed again so far, of a stroke that is redone.
+    Redoing(usize),
     /// Bricks still to be removed again, and the reason.
     Leaving(usize, Hindrance),
 }
@@ -67,7 +74,8 @@ pub(crate) struct Place {
 #[derive(Clone, Debug)]
 pub(crate) struct Undo {
     at: State,
-    was_requested: bool,
+    /// Whether undo and redo were pressed in the last tick.
+    was_requested: [bool; 2],
     /// Ring buffer, indexed by the number of the stroke.
     strokes: Vec<Stroke>,
 }
@@ -75,12 +83,12 @@ pub(crate) struct Undo {
 impl Default for Undo {
     /// Allocates all memory.
     fn default() -> Self {
-        Self { at: State::Rest, was_requested: false, strokes: vec![Stroke::default(); MAX_STROKES] }
+        Self { at: State::Rest, was_requested: [false; 2], strokes: vec![Stroke::default(); MAX_STROKES] }
     }
 }
 
 impl Undo {
-    /// Whether a stroke is being undone.
+    /// Whether a stroke is being undone or redone.
     pub fn runs(&self) -> bool {
         self.at != State::Rest
     }
@@ -90,23 +98,29 @@ impl Undo {
         &mut self.strokes[bone.stroke_number() % MAX_STROKES]
     }
 
-    /// Runs a tick. `hinders`: reason why no stroke can be undone now; `flap_away`: the flap is
+    /// Runs a tick. `pressed`: the buttons of undo and redo; `hinders`: reason why neither works
+    /// now, and why no redo does; `flap_away`: the flap is
     /// lifted; `tools`: tools of both hands.
     pub fn tick(
         &mut self,
         bone: &BoneVolume,
-        pressed: bool,
-        hinders: Option<Hindrance>,
+        pressed: [bool; 2],
+        (hinders, touches): (Option<Hindrance>, Option<Hindrance>),
         flap_away: bool,
         tools: &[Option<Place>],
     ) -> Option<Answer> {
         let before = std::mem::replace(&mut self.was_requested, pressed);
         match self.at {
-            State::Rest if pressed && !before => {
+            State::Rest if pressed[0] && !before[0] => {
                 let hinders = hinders.or_else(|| self.lacks(bone, flap_away));
                 hinders.map(Answer::Not).or_else(|| self.put_back(bone, tools, 0))
             }
+            State::Rest if pressed[1] && !before[1] => {
+                let hinders = hinders.or(touches).or_else(|| self.lacks_redo(bone, flap_away));
+                hinders.map(Answer::NotAgain).or_else(|| self.redo(bone, 0))
+            }
             State::Rest => None,
+            State::Redoing(done) => self.redo(bone, done),
             State::Returning(done) => self.put_back(bone, tools, done),
             State::Leaving(left, why) => self.take_away(bone, left, why),
         }
@@ -121,6 +135,29 @@ impl Undo {
             (_, _, true) => Some(Hindrance::FlapThere),
             (_, _, false) => Some(Hindrance::FlapAway),
         }
+    }
+
+    /// Returns why no undone stroke fits the present state of the bone.
+    fn lacks_redo(&self, bone: &BoneVolume, flap_away: bool) -> Option<Hindrance> {
+        let next = self.strokes[(bone.stroke_number() + 1) % MAX_STROKES];
+        match (bone.undone_strokes(), next.flap_away) {
+            (0, _) => Some(Hindrance::NothingUndone),
+            (_, was_away) if was_away == flap_away => None,
+            (_, true) => Some(Hindrance::FlapThere),
+            (_, false) => Some(Hindrance::FlapAway),
+        }
+    }
+
+    /// Removes the bone of the stroke that was undone last again.
+    fn redo(&mut self, bone: &BoneVolume, done: usize) -> Option<Answer> {
+        if done == 0 {
+            bone.take_up_stroke();
+        }
+        let all = bone.stroke_bricks();
+        let end = (done + BRICKS).min(all);
+        (done..end).for_each(|n| bone.exchange_brick(n));
+        self.at = if end == all { State::Rest } else { State::Redoing(end) };
+        (end == all).then(|| Answer::Again(*self.newest(bone)))
     }
 
     fn put_back(&mut self, bone: &BoneVolume, tools: &[Option<Place>], done: usize) -> Option<Answer> {
@@ -169,6 +206,30 @@ mod tests {
     use glam::IVec3;
     use trepan_volume::{AIR_HU, VoxelVolume};
 
+    const UNDO: [bool; 2] = [true, false];
+    const REDO: [bool; 2] = [false, true];
+    const FREE: (Option<Hindrance>, Option<Hindrance>) = (None, None);
+
+    #[test]
+    fn an_undone_stroke_is_redone_over_several_ticks_unless_the_tool_touches() {
+        let (bone, whole) = trench();
+        let cut = bone.snapshot();
+        let mut undo = Undo::default();
+        undo.newest(&bone).mm3 = 5.0;
+        let run = |undo: &mut Undo, pressed, why| {
+            undo.tick(&bone, [false; 2], FREE, false, &[]);
+            (0..9).find_map(|_| undo.tick(&bone, pressed, (None, why), false, &[]))
+        };
+        assert_eq!(run(&mut undo, REDO, None), Some(Answer::NotAgain(Hindrance::NothingUndone)));
+        assert!(matches!(run(&mut undo, UNDO, None), Some(Answer::Back(_))) && bone.snapshot() == whole);
+        let touches = Some(Hindrance::Touches);
+        assert_eq!(run(&mut undo, REDO, touches), Some(Answer::NotAgain(Hindrance::Touches)));
+        let again = run(&mut undo, REDO, None);
+        assert_eq!(again, Some(Answer::Again(Stroke { mm3: 5.0, ..Stroke::default() })));
+        assert!(bone.snapshot() == cut && !undo.runs());
+        assert!(matches!(run(&mut undo, UNDO, None), Some(Answer::Back(_))) && bone.snapshot() == whole);
+    }
+
     /// Makes a block with a trench of 40 bricks.
     fn trench() -> (BoneVolume, VoxelVolume<i16>) {
         let whole = VoxelVolume::isotropic([320, 16, 16], Vec3::ZERO, 1.0, 900i16);
@@ -193,7 +254,7 @@ mod tests {
         let mut ticks = 0;
         let answer = loop {
             ticks += 1;
-            let answer = undo.tick(&bone, true, None, false, &[probe(100.0, 12.0)]);
+            let answer = undo.tick(&bone, UNDO, FREE, false, &[probe(100.0, 12.0)]);
             let mut changed = 0;
             bone.changed(&mut seen, usize::MAX, |_| changed += 1);
             assert!(changed <= BRICKS, "{changed} bricks in a tick");
@@ -211,15 +272,15 @@ mod tests {
         let (bone, whole) = trench();
         let cut = bone.snapshot();
         let mut undo = Undo::default();
-        assert_eq!(undo.tick(&bone, true, None, false, &[None, probe(300.0, 12.0)]), None);
+        assert_eq!(undo.tick(&bone, UNDO, FREE, false, &[None, probe(300.0, 12.0)]), None);
         assert!(bone.snapshot() != cut);
-        let into = |undo: &mut Undo| undo.tick(&bone, true, None, false, &[None, probe(150.0, 4.0)]);
+        let into = |undo: &mut Undo| undo.tick(&bone, UNDO, FREE, false, &[None, probe(150.0, 4.0)]);
         let answer = (0..9).find_map(|_| into(&mut undo));
         assert_eq!(answer, Some(Answer::Not(Hindrance::Tool)));
         assert!(bone.snapshot() == cut && !undo.runs() && bone.strokes() == 1);
-        assert_eq!(undo.tick(&bone, true, None, false, &[]), None, "pressed once, it requests once");
-        undo.tick(&bone, false, None, false, &[]);
-        assert!((0..9).any(|_| undo.tick(&bone, true, None, false, &[]).is_some()) && bone.snapshot() == whole);
+        assert_eq!(undo.tick(&bone, UNDO, FREE, false, &[]), None, "pressed once, it requests once");
+        undo.tick(&bone, [false; 2], FREE, false, &[]);
+        assert!((0..9).any(|_| undo.tick(&bone, UNDO, FREE, false, &[]).is_some()) && bone.snapshot() == whole);
     }
 
     #[test]
@@ -229,8 +290,8 @@ mod tests {
             let mut undo = Undo::default();
             undo.tick(
                 &bone,
-                true,
-                Some(Hindrance::FlapMoves).filter(|_| place == Vec3::ZERO),
+                UNDO,
+                (Some(Hindrance::FlapMoves).filter(|_| place == Vec3::ZERO), None),
                 false,
                 &[Some(Place {
                     tool: Tool::burr(3.0),

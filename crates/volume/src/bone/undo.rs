@@ -95,6 +95,17 @@ impl BoneVolume {
         self.strokes.drop_newest();
     }
 
+    /// Number of undone strokes that can be redone: those since the last stroke began.
+    pub fn undone_strokes(&self) -> usize {
+        self.strokes.undone()
+    }
+
+    /// Makes the stroke that was undone last the newest again, to exchange its bricks once more;
+    /// false if there is none. For the writer only.
+    pub fn take_up_stroke(&self) -> bool {
+        self.strokes.take_up()
+    }
+
     /// Restores all bricks of the newest stroke. For the writer only; up to a few milliseconds for
     /// the largest stroke.
     pub fn undo_stroke(&self) -> Undone {
@@ -176,6 +187,36 @@ mod tests {
         assert_eq!(back(&bone), [900, 900]);
         bone.exchange_brick(0);
         assert_eq!((back(&bone), bone.strokes()), ([AIR_HU, 77], 1), "exchanged twice it is as it was");
+    }
+
+    #[test]
+    fn undone_strokes_are_redone_until_a_new_one_begins() {
+        let bone = BoneVolume::new(&block(), 400).unwrap();
+        let mut states = vec![bone.snapshot()];
+        for n in 0..4 {
+            bone.begin_stroke();
+            (0..=n).for_each(|x| bone.set_hu(IVec3::new(6 + x, 4, 5 + n), AIR_HU));
+            bone.end_stroke();
+            states.push(bone.snapshot());
+        }
+        let redo = |bone: &BoneVolume| {
+            let taken = bone.take_up_stroke();
+            (0..bone.stroke_bricks()).filter(|_| taken).for_each(|n| bone.exchange_brick(n));
+            taken
+        };
+        (0..3).for_each(|_| _ = bone.undo_stroke());
+        assert!(bone.snapshot() == states[1] && bone.undone_strokes() == 3);
+        assert!(redo(&bone) && bone.snapshot() == states[2]);
+        assert!(redo(&bone) && bone.snapshot() == states[3]);
+        assert!(matches!(bone.undo_stroke(), Undone::Bricks(_)) && bone.snapshot() == states[2]);
+        assert!(redo(&bone) && redo(&bone) && bone.snapshot() == states[4]);
+        assert!(!redo(&bone) && bone.snapshot() == states[4], "nothing is left");
+        bone.undo_stroke();
+        bone.begin_stroke();
+        bone.set_hu(IVec3::new(6, 5, 5), AIR_HU);
+        bone.end_stroke();
+        let new = bone.snapshot();
+        assert!(!redo(&bone) && bone.snapshot() == new, "a new stroke ends it");
     }
 
     #[test]

@@ -96,7 +96,7 @@ impl Opening {
         brain: Option<&VoxelVolume<u8>>,
         recipe: &Recipe,
     ) -> Result<Self, SessionError> {
-        let reference = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
+        let (reference, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
         let inside = brain.map(Inside::of);
         let opening = Self::of_patient(&bone_of(&reference, isovalue_hu)?, inside.as_ref(), recipe.opening)?;
         opening.on(&bone_of(skull, isovalue_hu)?, brain.is_some())

@@ -119,7 +119,7 @@ fn on_every_preset(ct: &Path, brain: &Path, requested: Option<[f32; 3]>) -> Vec<
     let isovalue = bone_isovalue(&ct);
     let on = |spacing_mm| {
         let recipe = Recipe { spacing_mm, opening: requested, ..recipe() };
-        let skull = make_skull(&ct, &recipe, isovalue).unwrap();
+        let (skull, _) = make_skull(&ct, &recipe, isovalue).unwrap();
         Opening::planned(&ct, &skull, isovalue, Some(&classes), &recipe).unwrap()
     };
     [0.5, 0.75, 1.0, 1.5].map(on).to_vec()

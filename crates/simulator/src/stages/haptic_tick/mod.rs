@@ -73,6 +73,7 @@ impl HapticStage {
             (stale, TickRecord::STALE),
             (lost, TickRecord::LOST),
             (through, TickRecord::THROUGH),
+            (self.undo.runs(), TickRecord::UNDOING),
         ];
         let record = self.record(input, &sample, wrench, desired, &flags, back_mm3);
         let inputs = self.warning_inputs(&record, &sample, ahead_mm, input.patch, (desired, warm));
@@ -185,6 +186,8 @@ pub struct HapticStage {
     holes: u32,
     feed: Feed,
     flap: Option<Flap>,
+    /// Whether the flap's button was pressed in the last tick.
+    asked_flap: bool,
     fault: AfterFault,
     released: bool,
 }
@@ -228,6 +231,7 @@ impl HapticStage {
             holes: 0,
             feed: Feed::default(),
             flap: None,
+            asked_flap: false,
             fault: AfterFault::default(),
             released: false,
         }

@@ -43,6 +43,7 @@ impl HapticStage {
         let change = self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open());
         match change {
             Some(Change::Refused) => report(What::NotOpen),
+            Some(Change::Busy) => report(What::NotChanged),
             Some(Change::Taken) => {
                 if let Some(rigid) = &mut self.rigid[self.tray.slot()] {
                     rigid.reset(self.proxy);
@@ -62,15 +63,27 @@ impl HapticStage {
 
     /// Runs the tick of the flap.
     pub(super) fn follow_flap(&mut self, tool: &ToolState, drilling: bool, report: &mut dyn FnMut(What)) {
-        let free = self.is_free() && self.phase() == Phase::Craniotomy && !self.undo.runs();
+        let hinders = [
+            (self.phase() == Phase::Brain, Hindrance::BrainTool),
+            (drilling, Hindrance::Pedal),
+            (!self.is_free(), Hindrance::Touches),
+            (self.undo.runs(), Hindrance::UndoRuns),
+        ];
+        let hinders = hinders.into_iter().find_map(|(stands, why)| stands.then_some(why));
         let cut = self.bone_step.removed_mm3 > 0.0;
-        if let (Some(bone), Some(flap)) = (&self.bone, &mut self.flap) {
-            flap.tick(bone, tool.buttons, drilling, cut, free).into_iter().for_each(report);
+        let pressed = tool.buttons.has(Buttons::FLAP);
+        let before = std::mem::replace(&mut self.asked_flap, pressed);
+        match (&self.bone, &mut self.flap) {
+            (Some(bone), Some(flap)) => {
+                flap.tick(bone, tool.buttons, (drilling, cut), hinders).into_iter().for_each(report);
+            }
+            _ if pressed && !before => report(What::NoFlap),
+            _ => {}
         }
     }
 
-    /// Begins, ends and undoes strokes; `second` is the pose of the second hand's tool. Returns the
-    /// restored bone, mm³.
+    /// Begins, ends, undoes and redoes strokes; `second` is the pose of the second hand's tool.
+    /// Returns the restored bone, mm³, negative for a redo.
     pub(super) fn undo(
         &mut self,
         tool: &ToolState,
@@ -79,6 +92,7 @@ impl HapticStage {
         report: &mut dyn FnMut(What),
     ) -> f32 {
         let hinders = self.hinders_undo(tool);
+        let touches = (!self.is_free()).then_some(Hindrance::Touches);
         let Some(bone) = &self.bone else { return 0.0 };
         let flap_away = self.flap.as_ref().is_some_and(Flap::is_away);
         if self.drill.stroke(bone, tool, drilling) {
@@ -90,9 +104,10 @@ impl HapticStage {
             second.map(|pose| place(SecondHand::tool(), pose, Hindrance::SecondTool)),
         ];
         let moved = self.undo.runs();
-        let answer = self.undo.tick(bone, tool.buttons.has(Buttons::UNDO), hinders, flap_away, &tools);
+        let pressed = [Buttons::UNDO, Buttons::REDO].map(|button| tool.buttons.has(button));
+        let answer = self.undo.tick(bone, pressed, (hinders, touches), flap_away, &tools);
         let Some(answer) = answer else { return 0.0 };
-        if moved || matches!(answer, Answer::Back(_)) {
+        if moved || matches!(answer, Answer::Back(_) | Answer::Again(_)) {
             self.flap.iter_mut().for_each(Flap::bone_came_back);
         }
         let (what, back_mm3) = match answer {
@@ -100,6 +115,11 @@ impl HapticStage {
                 self.holes = self.holes.saturating_sub(stroke.through);
                 (What::Undone(stroke.mm3), stroke.mm3)
             }
+            Answer::Again(stroke) => {
+                self.holes += stroke.through;
+                (What::Redone(stroke.mm3), -stroke.mm3)
+            }
+            Answer::NotAgain(why) => (What::NotRedone(why), 0.0),
             Answer::Not(why) => (What::NotUndone(why), 0.0),
         };
         report(what);

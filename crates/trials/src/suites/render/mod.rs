@@ -6,6 +6,7 @@ mod bores;
 pub(super) mod faults;
 mod likeness;
 mod models;
+mod rest;
 pub mod rivals;
 pub(super) mod scenes;
 pub(super) mod speed;
@@ -52,7 +53,7 @@ pub const SPARSE: Setting =
 /// Lists the parts: accuracy on small pictures, speed on large ones, models and failures.
 pub fn parts(_: Scope) -> Vec<Part> {
     type Subject = fn(Scope, Option<&Gpu>, &mut Findings);
-    let all: [(&str, Subject); 7] = [
+    let all: [(&str, Subject); 8] = [
         ("depth", accuracy::depth),
         ("walls", |_, gpu, found| accuracy::walls(gpu, found)),
         ("bores", bores::run),
@@ -60,6 +61,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
         ("faults", |_, gpu, found| faults::run(gpu, found)),
         ("speed", speed::run),
         ("models", models::run),
+        ("rest", |scope, _, found| rest::run(scope, found)),
     ];
     // Without a driver only the processor's rows are made.
     let drawn = |(name, subject): (&str, Subject)| {

@@ -1,0 +1,354 @@
+//! A page of the window as data: texts, buttons, choices, pictures. The window draws it and returns
+//! the actions of what the user pressed.
+//!
+//! # Practice
+//! A page is made anew for every picture, so it always shows the state it was made of. It scrolls
+//! where the window is too small, and stands in one column where the window is narrow.
+//!
+//! # When not to use it
+//! For a running session: its picture and panel are a [`Session`](super::Session).
+
+use super::palette::{GREEN, ORANGE, PALE, SKY, VERMILION};
+use crate::Image;
+use eframe::egui::{self, Color32, RichText};
+use std::sync::Arc;
+
+/// A page; `A` is what a press of one of its controls does.
+#[derive(Clone, Debug)]
+pub struct Page<A> {
+    /// The title on top.
+    pub title: String,
+    /// One line below it.
+    pub line: String,
+    /// Columns from left to right; one below the other in a narrow window.
+    pub columns: Vec<Vec<Item<A>>>,
+    /// Controls that stay in view at the bottom.
+    pub foot: Vec<Item<A>>,
+    /// The action of Escape, if it does something.
+    pub escape: Option<A>,
+}
+
+impl<A> Default for Page<A> {
+    fn default() -> Self {
+        Self { title: String::new(), line: String::new(), columns: Vec::new(), foot: Vec::new(), escape: None }
+    }
+}
+
+/// Part of a page.
+#[derive(Clone, Debug)]
+pub enum Item<A> {
+    /// Heading of a part.
+    Heading(String),
+    /// A paragraph.
+    Text(String),
+    /// A paragraph of secondary text.
+    Note(String),
+    /// A verdict: passed or not, in words and colour.
+    Verdict(bool, String),
+    /// A text with a patch of a colour.
+    Label(String, [u8; 3]),
+    /// A remark that must be seen.
+    Alert(String),
+    /// A button.
+    Button(Button<A>),
+    /// Parts beside each other, which wrap.
+    Row(Vec<Item<A>>),
+    /// One of several options: name, options, index of the chosen one.
+    Choice(String, Vec<Choosable>, usize, fn(usize) -> A),
+    /// A line of text: name, value, what stands in the empty field.
+    Field(String, String, String, fn(String) -> A),
+    /// A number on a slider.
+    Amount(Amount, fn(f32) -> A),
+    /// A share of work that is done, 0 to 1, with a text.
+    Progress(f32, String),
+    /// A picture.
+    Picture(Picture<A>),
+    /// Rows of equal length; the first is the heading.
+    Table(Vec<Vec<String>>),
+    /// Values in their order, as a curve with its title.
+    Curve(String, Vec<f64>),
+}
+
+/// A button on a page.
+#[derive(Clone, Debug)]
+pub struct Button<A> {
+    /// Its label.
+    pub name: String,
+    /// What it does, in a sentence; or why it cannot be used now.
+    pub hint: String,
+    /// Whether it is the usual next step.
+    pub main: bool,
+    /// Its action; `None` where it cannot be used.
+    pub does: Option<A>,
+}
+
+/// An option of a choice.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choosable {
+    /// Its label.
+    pub name: String,
+    /// What it means, or why it cannot be chosen.
+    pub hint: String,
+    /// Whether it can be chosen.
+    pub open: bool,
+}
+
+/// A number and its range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Amount {
+    /// Name with the unit.
+    pub name: String,
+    /// Its value.
+    pub value: f32,
+    /// Smallest and largest value.
+    pub range: [f32; 2],
+    /// Size of a step.
+    pub step: f32,
+}
+
+/// A picture on a page.
+#[derive(Clone, Debug)]
+pub struct Picture<A> {
+    /// Name for people who do not see it.
+    pub name: String,
+    /// The picture; an equal number means that it did not change.
+    pub image: (u64, Arc<Image>),
+    /// Largest height, points.
+    pub height: f32,
+    /// Letters on it: position as a share of width and height, text.
+    pub letters: Vec<([f32; 2], String)>,
+    /// The action of a click at a position, a share of width and height.
+    pub clicked: Option<fn([f32; 2]) -> A>,
+    /// The action of a drag by a share of width and height.
+    pub dragged: Option<fn([f32; 2]) -> A>,
+}
+
+impl<A> Item<A> {
+    /// A button that can be used.
+    pub fn button(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does) })
+    }
+
+    /// The button of the usual next step.
+    pub fn main(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: true, does: Some(does) })
+    }
+
+    /// A button that cannot be used now, and why.
+    pub fn closed(name: impl Into<String>, why: impl Into<String>) -> Self {
+        Self::Button(Button { name: name.into(), hint: why.into(), main: false, does: None })
+    }
+}
+
+/// Colour of text.
+const INK: Color32 = Color32::from_gray(225);
+/// Width of a column below which columns stand below each other, points.
+const NARROW: f32 = 300.0;
+/// Largest width of the page, points.
+const WIDEST: f32 = 1280.0;
+
+/// Pictures of pages as textures of the window.
+#[derive(Default)]
+pub(crate) struct Textures(Vec<(String, u64, egui::TextureHandle)>);
+
+impl Textures {
+    fn of<A>(&mut self, ui: &egui::Ui, picture: &Picture<A>) -> egui::TextureId {
+        let (number, image) = &picture.image;
+        let known = self.0.iter().position(|(name, ..)| *name == picture.name);
+        if let Some((_, shown, texture)) = known.map(|at| &self.0[at]).filter(|(_, shown, _)| shown == number) {
+            debug_assert_eq!(shown, number);
+            return texture.id();
+        }
+        known.map(|at| self.0.swap_remove(at));
+        let size = [image.width as usize, image.height as usize];
+        let colours = egui::ColorImage::from_rgba_unmultiplied(size, &image.rgba);
+        let texture = ui.ctx().load_texture(&picture.name, colours, egui::TextureOptions::LINEAR);
+        self.0.push((picture.name.clone(), *number, texture));
+        self.0[self.0.len() - 1].2.id()
+    }
+}
+
+/// Draws a page over the whole area; returns the actions of what was pressed.
+pub(crate) fn show<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures) -> Vec<A> {
+    let mut done = Vec::new();
+    if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
+        done.extend(page.escape.clone());
+    }
+    ui.add_space(10.0);
+    ui.label(RichText::new(&page.title).size(26.0).strong());
+    if !page.line.is_empty() {
+        ui.label(RichText::new(&page.line).size(15.0).color(PALE));
+    }
+    ui.separator();
+    if !page.foot.is_empty() {
+        egui::Panel::bottom("foot").resizable(false).show(ui, |ui| {
+            ui.add_space(8.0);
+            ui.horizontal_wrapped(|ui| page.foot.iter().for_each(|item| draw(ui, item, textures, &mut done)));
+            ui.add_space(8.0);
+        });
+    }
+    egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        columns(ui, page, textures, &mut done);
+        ui.add_space(12.0);
+    });
+    done
+}
+
+fn columns<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures, done: &mut Vec<A>) {
+    let width = (ui.available_width() - 12.0).min(WIDEST);
+    let beside = page.columns.len().max(1);
+    if beside > 1 && width / beside as f32 > NARROW {
+        ui.set_max_width(width);
+        ui.columns(beside, |columns| {
+            for (ui, items) in columns.iter_mut().zip(&page.columns) {
+                items.iter().for_each(|item| draw(ui, item, textures, done));
+            }
+        });
+    } else {
+        ui.set_max_width(width);
+        page.columns.iter().flatten().for_each(|item| draw(ui, item, textures, done));
+    }
+}
+
+fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, done: &mut Vec<A>) {
+    match item {
+        Item::Heading(text) => {
+            ui.add_space(8.0);
+            ui.label(RichText::new(text).size(18.0).strong().color(SKY));
+        }
+        Item::Text(text) => _ = ui.label(RichText::new(text).size(15.0).color(INK)),
+        Item::Note(text) => _ = ui.label(RichText::new(text).color(PALE)),
+        Item::Verdict(passed, text) => {
+            let colour = if *passed { GREEN } else { ORANGE };
+            ui.label(RichText::new(text).size(18.0).strong().color(colour));
+        }
+        Item::Label(text, [r, g, b]) => {
+            let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
+            ui.painter().rect_filled(patch, 2.0, Color32::from_rgb(*r, *g, *b));
+            ui.label(RichText::new(text).color(INK));
+        }
+        Item::Alert(text) => {
+            egui::Frame::new().fill(VERMILION).inner_margin(10.0).show(ui, |ui| {
+                ui.label(RichText::new(text).size(16.0).strong().color(Color32::BLACK));
+            });
+        }
+        Item::Button(button) => press(ui, button, done),
+        Item::Row(items) => {
+            _ = ui.horizontal_wrapped(|ui| items.iter().for_each(|item| draw(ui, item, textures, done)));
+        }
+        Item::Choice(name, options, chosen, does) => choose(ui, (name, options, *chosen), *does, done),
+        Item::Field(name, value, empty, does) => write(ui, [name, value, empty], *does, done),
+        Item::Amount(amount, does) => {
+            let (mut value, [low, high]) = (amount.value, amount.range);
+            let slider = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into()).text(&amount.name);
+            if ui.add(slider).changed() {
+                done.push(does(value));
+            }
+        }
+        Item::Progress(share, text) => {
+            ui.add(egui::ProgressBar::new(*share).text(text).animate(true).desired_height(22.0));
+        }
+        Item::Picture(picture) => look(ui, picture, textures, done),
+        Item::Table(rows) => table(ui, rows),
+        Item::Curve(title, values) => curve(ui, title, values),
+    }
+}
+
+fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {
+    let mut text = RichText::new(&button.name).size(15.0);
+    let mut shape = egui::Button::new(text.clone()).wrap().min_size(egui::vec2(44.0, 30.0));
+    if button.main {
+        text = text.strong().color(Color32::BLACK);
+        shape = egui::Button::new(text).wrap().min_size(egui::vec2(44.0, 34.0)).fill(SKY);
+    }
+    let shown = ui.add_enabled(button.does.is_some(), shape);
+    if shown.clicked() {
+        done.extend(button.does.clone());
+    }
+    if !button.hint.is_empty() {
+        shown.on_hover_text(&button.hint).on_disabled_hover_text(&button.hint);
+    }
+}
+
+fn choose<A>(
+    ui: &mut egui::Ui,
+    (name, options, chosen): (&str, &[Choosable], usize),
+    does: fn(usize) -> A,
+    done: &mut Vec<A>,
+) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(name).color(PALE));
+        for (at, option) in options.iter().enumerate() {
+            let shape = egui::Button::selectable(at == chosen, &option.name).min_size(egui::vec2(0.0, 26.0));
+            let shown = ui.add_enabled(option.open || at == chosen, shape);
+            if shown.clicked() && at != chosen {
+                done.push(does(at));
+            }
+            if !option.hint.is_empty() {
+                shown.on_hover_text(&option.hint).on_disabled_hover_text(&option.hint);
+            }
+        }
+    });
+}
+
+fn write<A>(ui: &mut egui::Ui, [name, value, empty]: [&String; 3], does: fn(String) -> A, done: &mut Vec<A>) {
+    ui.horizontal_wrapped(|ui| {
+        let label = ui.label(RichText::new(name).color(PALE));
+        let mut text = value.clone();
+        let width = ui.available_width().clamp(120.0, 420.0);
+        let edit = egui::TextEdit::singleline(&mut text).hint_text(empty.as_str()).desired_width(width);
+        if ui.add(edit).labelled_by(label.id).changed() {
+            done.push(does(text));
+        }
+    });
+}
+
+fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, textures: &mut Textures, done: &mut Vec<A>) {
+    let id = textures.of(ui, picture);
+    let image = &picture.image.1;
+    let shape = image.width as f32 / image.height.max(1) as f32;
+    let width = ui.available_width().min(picture.height * shape).max(16.0);
+    let size = egui::vec2(width, width / shape);
+    let (area, response) = ui.allocate_exact_size(size, egui::Sense::click_and_drag());
+    let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+    ui.painter().image(id, area, whole, Color32::WHITE);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &picture.name));
+    for ([x, y], letter) in &picture.letters {
+        let at = area.min + egui::vec2(x * area.width(), y * area.height());
+        let font = egui::FontId::proportional(16.0);
+        for (shift, colour) in [(egui::vec2(1.0, 1.0), Color32::BLACK), (egui::Vec2::ZERO, Color32::WHITE)] {
+            ui.painter().text(at + shift, egui::Align2::CENTER_CENTER, letter, font.clone(), colour);
+        }
+    }
+    let share = |v: egui::Vec2| [v.x / area.width(), v.y / area.height()];
+    if let (true, Some(does), Some(at)) = (response.clicked(), picture.clicked, response.interact_pointer_pos()) {
+        done.push(does(share(at - area.min)));
+    }
+    if let Some(does) = picture.dragged.filter(|_| response.dragged()) {
+        done.push(does(share(response.drag_delta())));
+    }
+}
+
+fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
+    ui.add_space(8.0);
+    ui.label(RichText::new(title).strong());
+    let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(at, value)| [at as f64 + 1.0, *value]).collect();
+    let still = egui_plot::Plot::new(title).height(120.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
+    still.show(ui, |plot| {
+        plot.line(egui_plot::Line::new(title, points.clone()).color(SKY).width(2.0));
+        plot.points(egui_plot::Points::new(title, points).color(SKY).radius(4.0));
+    });
+}
+
+fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {
+    let columns = rows.first().map_or(1, Vec::len);
+    egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).show(ui, |ui| {
+        for (at, row) in rows.iter().enumerate() {
+            for cell in row {
+                let text = RichText::new(cell).size(14.0).color(INK);
+                ui.label(if at == 0 { text.strong() } else { text });
+            }
+            ui.end_row();
+        }
+    });
+}

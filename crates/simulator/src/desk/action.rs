@@ -1,0 +1,71 @@
+//! What the controls of the pages do.
+
+use crate::desk::browse::Goal;
+use std::path::PathBuf;
+
+/// What a press of a control does.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Action {
+    /// Shows the start page.
+    Home,
+    /// Shows the sessions that were kept.
+    Sessions,
+    /// Shows the lessons.
+    Lessons,
+    /// Begins a lesson.
+    Lesson(usize),
+    /// Chooses the built-in case.
+    BuiltIn,
+    /// Chooses a recent case.
+    Recent(usize),
+    /// Takes a recent case off the list.
+    Forget(usize),
+    /// Names the chosen case.
+    Name(String),
+    /// Looks for a file or folder.
+    Browse(Goal),
+    /// Looks into a folder.
+    Into(PathBuf),
+    /// Writes the path that is looked into.
+    Path(String),
+    /// Takes a file or folder for a purpose.
+    Take(Goal, PathBuf),
+    /// Whether the MRI is registered to the CT: yes is the second option.
+    Register(usize),
+    /// Forgets the chosen place of the opening.
+    UsualOpening,
+    /// Names the session.
+    Session(String),
+    /// Names the person.
+    Person(String),
+    /// Chooses a device.
+    Device(usize),
+    /// Chooses the first tool.
+    Tool(usize),
+    /// Chooses a quality.
+    Quality(usize),
+    /// Sets the flap's diameter, mm.
+    Flap(f32),
+    /// Shows the chosen case in pictures.
+    Check,
+    /// Chooses the opening by a click on the head, a share of the picture.
+    OpenAt([f32; 2]),
+    /// Turns the head, by a share of the picture.
+    Turn([f32; 2]),
+    /// Sets the share of the MRI in the slices.
+    Blend(f32),
+    /// Moves the slices along an axis to a place, mm.
+    Slide(usize, f32),
+    /// Begins the chosen session.
+    Begin,
+    /// Ends loading.
+    Cancel,
+    /// Shows a session's result.
+    Result(PathBuf),
+    /// Opens a session's report in the browser.
+    Report(PathBuf),
+    /// Replays a session's recording.
+    Replay(PathBuf),
+    /// Closes the window.
+    Close,
+}

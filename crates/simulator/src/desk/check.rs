@@ -1,0 +1,381 @@
+//! Shows a case in pictures before the operation: sides, fit of CT and MRI, tissue labels, place of
+//! the opening.
+//!
+//! # Practice
+//! The slices show the skull's density in the case's voxels and the MRI around the brain, as the
+//! session uses them, with the patient's right on the left. A click on the head chooses the
+//! opening: the line from there to the centre of the head.
+
+use crate::case::Case;
+use crate::case::opening::eye;
+use crate::desk::action::Action;
+use crate::error::SessionError;
+use crate::printable::printable;
+use crate::tissue_class::TissueClass;
+use glam::{DAffine3, DVec3, Vec2};
+use std::sync::Arc;
+use trepan_geometry::{Aabb, Vec3};
+use trepan_gpu::{Gpu, GpuError};
+use trepan_haptics::script::Site;
+use trepan_render::window::{Amount, Item, Page, Picture};
+use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
+use trepan_volume::{BoneVolume, VoxelVolume};
+
+/// Width and height of the picture of the head, pixels.
+const HEAD: [u32; 2] = [420, 340];
+/// Edge of a slice, pixels.
+const SLICE: u32 = 220;
+/// Grey range of bone, HU, numerical.
+const WINDOW_HU: [f64; 2] = [-200.0, 1500.0];
+/// Steps of a ray on its way to the bone, mm, numerical.
+const STEP_MM: f32 = 0.4;
+/// Turn of the head for a drag over the whole picture, rad, numerical.
+const TURN_RAD: f32 = 3.0;
+
+/// The planes: name, world axes to the right and upwards in the picture, letters at left, right,
+/// bottom and top.
+const PLANES: [(&str, [DVec3; 2], [&str; 4]); 3] = [
+    ("axial", [DVec3::NEG_X, DVec3::Y], ["R", "L", "P", "A"]),
+    ("coronal", [DVec3::NEG_X, DVec3::Z], ["R", "L", "I", "S"]),
+    ("sagittal", [DVec3::NEG_Y, DVec3::Z], ["A", "P", "I", "S"]),
+];
+
+/// Colours of the tissue classes, by their code less one.
+const COLOURS: [[u8; 3]; 9] = [
+    [0, 158, 115],
+    [240, 228, 66],
+    [204, 121, 167],
+    [86, 180, 233],
+    [213, 94, 0],
+    [0, 114, 178],
+    [230, 159, 0],
+    [160, 160, 255],
+    [213, 94, 0],
+];
+
+/// A case that is looked at.
+pub(crate) struct Check {
+    case: Case,
+    /// What the user calls it.
+    name: String,
+    /// Centre of the slices, RAS mm.
+    at: Vec3,
+    /// Share of the MRI in the slices.
+    mri: f32,
+    bounds: Aabb,
+    head: Option<Head>,
+    slices: [(u64, Arc<Image>); 3],
+    /// The chosen opening, RAS mm.
+    pub opening: Option<[f32; 3]>,
+    made: u64,
+}
+
+/// The head in three dimensions.
+struct Head {
+    bone: Arc<BoneVolume>,
+    painter: Painter,
+    camera: Camera,
+    image: (u64, Arc<Image>),
+    centre: Vec3,
+    /// Where the skull is opened.
+    place: Option<Vec3>,
+}
+
+impl Head {
+    fn view(&self) -> View {
+        self.camera.view(HEAD[0] as f32 / HEAD[1] as f32)
+    }
+
+    /// A cross on the place of the opening, and R and L on the sides of the patient.
+    fn marks(&self) -> Vec<([f32; 2], String)> {
+        let half_mm = 0.5 * self.bone.bounds().size().x;
+        let sides = [("R", half_mm), ("L", -half_mm)].map(|(side, mm)| (side, self.centre + mm * Vec3::X));
+        let all = self.place.map(|place| ("+", place)).into_iter().chain(sides);
+        let view = self.view();
+        let on_picture = |(text, point): (&str, Vec3)| {
+            let (at, _) = view.project(point);
+            ([0.5 + 0.5 * at.x, 0.5 - 0.5 * at.y].map(|share| share.clamp(0.03, 0.97)), text.to_string())
+        };
+        all.map(on_picture).collect()
+    }
+}
+
+impl Check {
+    /// Prepares the pictures of a case.
+    pub fn of(
+        case: Case,
+        name: String,
+        opening: Option<[f32; 3]>,
+        gpu: Result<Gpu, GpuError>,
+    ) -> Result<Self, SessionError> {
+        let bounds = match (&case.skull, &case.brain) {
+            (Some(skull), _) => skull.world_box(),
+            (None, Some(brain)) => brain.mri.world_box(),
+            (None, None) => return Err(SessionError::Case("this case holds neither a skull nor a brain".into())),
+        };
+        let site = case.opening.map(Site::from);
+        let centre = case.brain.as_ref().map_or(bounds.centre(), |brain| brain.mesh.bounds().centre());
+        let head = match &case.skull {
+            Some(skull) => {
+                let bone =
+                    BoneVolume::new(skull, case.isovalue_hu).map_err(|fault| SessionError::Case(fault.to_string()))?;
+                let bone = Arc::new(bone);
+                let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
+                let mut painter = Painter::on(gpu, &data, HEAD)?;
+                painter.set_quality(true, 1.0)?;
+                let towards = site.as_ref().map_or(Vec3::Y, eye);
+                let camera = Camera::viewed_from(bounds.centre(), towards, 420.0);
+                let place = site.map(|site| site.entry);
+                Some(Head { bone, painter, camera, image: (0, blank()), centre, place })
+            }
+            None => None,
+        };
+        let slices = std::array::from_fn(|_| (0, blank()));
+        let at = head.as_ref().and_then(|head| head.place).unwrap_or(bounds.centre());
+        let mut check = Self { case, name, at, mri: 0.5, bounds, head, slices, opening, made: 0 };
+        check.draw_slices();
+        check.draw_head()?;
+        Ok(check)
+    }
+
+    /// Sets the share of the MRI in the slices.
+    pub fn blend(&mut self, share: f32) {
+        self.mri = share;
+        self.draw_slices();
+    }
+
+    /// Moves the slices along an axis of the patient to a place, mm.
+    pub fn slide(&mut self, axis: usize, mm: f32) {
+        self.at[axis] = mm;
+        self.draw_slices();
+    }
+
+    /// Turns the head by a drag.
+    pub fn turn(&mut self, [x, y]: [f32; 2]) -> Result<(), SessionError> {
+        if let Some(head) = &mut self.head {
+            head.camera.orbit(-TURN_RAD * x, TURN_RAD * y);
+        }
+        self.draw_head()
+    }
+
+    /// Chooses the opening under a click on the head; false where there is no bone.
+    pub fn open_at(&mut self, [x, y]: [f32; 2]) -> Result<bool, SessionError> {
+        let Some(head) = &mut self.head else { return Ok(false) };
+        let view = head.view();
+        let ray = view.ray(Vec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y));
+        let Some(place) = first_bone(&head.bone, view.eye, ray) else { return Ok(false) };
+        head.place = Some(place);
+        self.at = place;
+        // A point a little outside, on the line to the centre of the head.
+        self.opening = Some((place + 5.0 * (place - head.centre).normalize_or_zero()).to_array());
+        self.draw_slices();
+        self.draw_head()?;
+        Ok(true)
+    }
+
+    fn draw_head(&mut self) -> Result<(), SessionError> {
+        self.made += 1;
+        let Some(head) = &mut self.head else { return Ok(()) };
+        let markers: Vec<Vec3> = head.place.into_iter().collect();
+        let slices = SliceLook { shown: false, ..SliceLook::default() };
+        let overlay = Overlay { markers: &markers, ..Overlay::default() };
+        let frame = Frame { slices, overlay, ..Frame::of(head.camera) };
+        let (image, _) = head.painter.picture(&frame)?;
+        head.image = (self.made, Arc::new(image));
+        Ok(())
+    }
+
+    fn draw_slices(&mut self) {
+        self.made += 1;
+        let images = PLANES.map(|(_, axes, _)| Arc::new(self.slice(axes)));
+        self.slices = images.map(|image| (self.made, image));
+    }
+
+    /// Half the edge of a slice, mm.
+    fn half_mm(&self) -> f64 {
+        0.5 * f64::from(self.bounds.size().max_element())
+    }
+
+    fn slice(&self, [right, up]: [DVec3; 2]) -> Image {
+        let half = self.half_mm();
+        let normal = right.cross(up).abs();
+        let middle = self.bounds.centre().as_dvec3();
+        let centre = middle + (self.at.as_dvec3() - middle) * normal;
+        let skull = self.case.skull.as_ref().map(Sampled::of);
+        let brain = self.case.brain.as_ref().map(|brain| (Sampled::of(&brain.mri), Sampled::of(&brain.classes)));
+        let most = self.case.brain.as_ref().map_or(1.0, |brain| brain.mri.data.iter().copied().fold(1.0f32, f32::max));
+        let mut rgba = Vec::with_capacity((SLICE * SLICE * 4) as usize);
+        for y in 0..SLICE {
+            for x in 0..SLICE {
+                let share = |n: u32| 2.0 * (f64::from(n) + 0.5) / f64::from(SLICE) - 1.0;
+                let point = centre + half * (share(x) * right - share(y) * up);
+                let hu = skull.as_ref().and_then(|skull| skull.at(point)).map_or(WINDOW_HU[0], f64::from);
+                let ct = ((hu - WINDOW_HU[0]) / (WINDOW_HU[1] - WINDOW_HU[0])).clamp(0.0, 1.0) as f32;
+                let (mri, class) = brain.as_ref().map_or((0.0, 0), |(mri, classes)| {
+                    (mri.at(point).unwrap_or(0.0) / most, classes.at(point).unwrap_or(0))
+                });
+                let grey = 255.0 * (ct * (1.0 - self.mri) + mri * self.mri);
+                let colour = COLOURS.get(usize::from(class).wrapping_sub(1));
+                let tint = colour.map_or([grey; 3], |colour| colour.map(|c| 0.75 * grey + 0.25 * f32::from(c)));
+                rgba.extend(tint.map(|c| c.clamp(0.0, 255.0) as u8));
+                rgba.push(255);
+            }
+        }
+        Image { width: SLICE, height: SLICE, rgba }
+    }
+
+    /// Place of the opening in a slice, as a share of its edges.
+    fn cross(&self, [right, up]: [DVec3; 2]) -> [f32; 2] {
+        let from = self.at.as_dvec3() - self.bounds.centre().as_dvec3();
+        let share = |axis: DVec3| (0.5 + 0.5 * from.dot(axis) / self.half_mm()) as f32;
+        [share(right), 1.0 - share(up)]
+    }
+
+    /// The page.
+    pub fn page(&self, fault: Option<&str>) -> Page<Action> {
+        let mut head: Vec<Item<Action>> = vec![Item::Heading("Place of the opening".into())];
+        if let Some(shown) = &self.head {
+            head.push(Item::Note("Click on the skull to open it there; drag to turn it.".into()));
+            head.push(Item::Picture(Picture {
+                name: "head".into(),
+                image: shown.image.clone(),
+                height: HEAD[1] as f32,
+                letters: shown.marks(),
+                clicked: Some(Action::OpenAt),
+                dragged: Some(Action::Turn),
+            }));
+        }
+        let place = match (self.opening, self.case.opening) {
+            (Some(_), _) => "the place that you chose".into(),
+            (None, Some(opening)) => {
+                format!("usual place: bone {:.1} mm thick, brain {:.1} mm deep", opening.bone_mm, opening.brain_mm)
+            }
+            (None, None) => "no place yet".into(),
+        };
+        head.push(Item::Text(place));
+        head.extend(fault.map(|fault| Item::Alert(fault.into())));
+        head.push(Item::Heading("Remarks".into()));
+        let notes = self.case.notes.iter().map(|note| Item::Note(printable(note)));
+        head.extend(notes);
+        Page {
+            title: format!("Check {}", printable(&self.name)),
+            line: "Right and left, the fit of CT and MRI, the tissue labels, the place of the opening".into(),
+            columns: vec![self.slices_part(), head],
+            foot: vec![
+                Item::main("Start the operation", "with this opening", Action::Begin),
+                Item::button("Back to the start page", "the opening is kept", Action::Home),
+            ],
+            escape: Some(Action::Home),
+        }
+    }
+
+    fn slices_part(&self) -> Vec<Item<Action>> {
+        let picture = |at: usize| {
+            let (name, axes, [left, right, bottom, top]) = PLANES[at];
+            let letter = |at: [f32; 2], text: &str| (at, text.to_string());
+            let letters = vec![
+                letter([0.05, 0.5], left),
+                letter([0.95, 0.5], right),
+                letter([0.5, 0.95], bottom),
+                letter([0.5, 0.05], top),
+                letter(self.cross(axes), "+"),
+            ];
+            let (image, height) = (self.slices[at].clone(), SLICE as f32);
+            Item::Picture(Picture { name: name.into(), image, height, letters, clicked: None, dragged: None })
+        };
+        let amount = |name: &str, axis: usize| Amount {
+            name: format!("{name}, mm"),
+            value: self.at[axis],
+            range: [self.bounds.min[axis], self.bounds.max[axis]],
+            step: 1.0,
+        };
+        let blend = Amount { name: "MRI over CT".into(), value: self.mri, range: [0.0, 1.0], step: 0.05 };
+        let mut items = vec![
+            Item::Heading("Slices".into()),
+            Item::Note("R right, L left, A front, P back, S up, I down of the patient".into()),
+            Item::Amount(blend, Action::Blend),
+            Item::Row((0..3).map(picture).collect()),
+            Item::Amount(amount("right", 0), |mm| Action::Slide(0, mm)),
+            Item::Amount(amount("front", 1), |mm| Action::Slide(1, mm)),
+            Item::Amount(amount("up", 2), |mm| Action::Slide(2, mm)),
+        ];
+        if let Some(brain) = &self.case.brain {
+            let found = |class: &TissueClass| brain.classes.data.contains(&class.code());
+            let names = TissueClass::ALL.into_iter().filter(found).map(|class| {
+                let colour = COLOURS.get(usize::from(class.code()).wrapping_sub(1)).copied().unwrap_or([255; 3]);
+                Item::Label(class.name().into(), colour)
+            });
+            items.push(Item::Row(names.collect()));
+        }
+        items
+    }
+}
+
+fn blank() -> Arc<Image> {
+    Arc::new(Image { width: 1, height: 1, rgba: vec![0; 4] })
+}
+
+/// Returns the first point of bone on a ray.
+fn first_bone(bone: &BoneVolume, eye: Vec3, ray: Vec3) -> Option<Vec3> {
+    let end = eye.distance(bone.bounds().centre()) + bone.bounds().size().length();
+    let count = (end / STEP_MM) as usize;
+    (0..count).map(|n| eye + STEP_MM * n as f32 * ray).find(|point| bone.is_bone(bone.voxel_of(*point)))
+}
+
+/// A volume that is read at world points.
+struct Sampled<'a, T> {
+    volume: &'a VoxelVolume<T>,
+    voxel_from_world: DAffine3,
+}
+
+impl<'a, T: Copy> Sampled<'a, T> {
+    fn of(volume: &'a VoxelVolume<T>) -> Self {
+        Self { volume, voxel_from_world: volume.world_from_voxel.inverse() }
+    }
+
+    /// Value of the nearest voxel; `None` outside.
+    fn at(&self, point: DVec3) -> Option<T> {
+        let voxel = self.voxel_from_world.transform_point3(point).round();
+        (voxel.min_element() >= 0.0).then(|| self.volume.get(voxel.as_usizevec3().to_array())).flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball of bone of 30 mm around a point on the patient's left.
+    fn ball() -> Case {
+        let mut skull = VoxelVolume::isotropic([80; 3], Vec3::splat(-40.0), 1.0, -1000i16);
+        for at in 0..skull.data.len() {
+            let place = skull.centre_of([at % 80, at / 80 % 80, at / 6400]);
+            if place.distance(DVec3::new(-5.0, 0.0, 0.0)) < 30.0 {
+                skull.data[at] = 1200;
+            }
+        }
+        Case { skull: Some(skull), isovalue_hu: 400, ..Case::default() }
+    }
+
+    #[test]
+    fn a_click_on_the_head_chooses_the_opening_and_the_slices_go_there() {
+        let mut check = Check::of(ball(), "c".into(), None, Err(GpuError::NoAdapter)).unwrap();
+        assert!(!check.open_at([0.01, 0.01]).unwrap() && check.opening.is_none(), "beside the head");
+        assert!(check.open_at([0.5, 0.5]).unwrap());
+        let [x, y, z] = check.opening.unwrap();
+        assert!(y > 30.0 && x.abs() < 8.0 && z.abs() < 8.0, "from the front: {:?}", check.opening);
+        assert!((check.at.y - 29.5).abs() < 1.5);
+    }
+
+    #[test]
+    fn the_patients_right_is_on_the_left_of_an_axial_slice() {
+        let mut check = Check::of(ball(), "c".into(), None, Err(GpuError::NoAdapter)).unwrap();
+        check.blend(0.0);
+        check.slide(2, 0.0);
+        let image = check.slices[0].1.clone();
+        let bright = |from: u32, to: u32| {
+            (from..to).filter(|x| image.rgba[((SLICE / 2 * SLICE + x) * 4) as usize] > 128).count()
+        };
+        // RAS: the left of the patient has negative x, so it stands on the right of the picture.
+        assert!(bright(SLICE / 2, SLICE) > bright(0, SLICE / 2));
+    }
+}

@@ -1,0 +1,159 @@
+//! What is filled in on the start page, and the options that follow from it.
+
+use crate::desk::settings::{Recent, Settings, Source, sessions};
+use crate::error::SessionError;
+use crate::options::Options;
+use crate::program::{Program, called};
+use std::path::Path;
+use trepan_budget::Quality;
+use trepan_haptics::{Listed, script};
+use trepan_render::window::Choosable;
+
+/// The start page as it is filled in.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Form {
+    /// What is remembered.
+    pub settings: Settings,
+    /// The chosen case.
+    pub case: Recent,
+    /// Name of the session; empty for none.
+    pub session: String,
+    /// Devices of this machine.
+    pub devices: Vec<Listed>,
+}
+
+/// A demonstration by script: its name, what it shows.
+const DEMONSTRATIONS: [(&str, &str); 2] =
+    [("", "the whole operation, by itself"), ("flap", "a bone flap is cut, by itself")];
+
+impl Form {
+    /// Reads the settings; the newest recent case is chosen, else the built-in one.
+    pub fn read(built_in: Option<&str>) -> Self {
+        let settings = Settings::read();
+        let usual = Recent { name: built_in.unwrap_or("built-in case").into(), ..Recent::default() };
+        let case = settings.recent.first().cloned().unwrap_or(usual);
+        Self { settings, case, ..Self::default() }
+    }
+
+    /// Names of the devices, as `--device` takes them, with what the page shows.
+    pub fn devices(&self, program: Program) -> Vec<(String, Choosable)> {
+        let choosable = |name: &str, hint: &str, open| Choosable { name: name.into(), hint: hint.into(), open };
+        let mouse = ("mouse".to_string(), choosable("mouse", "the mouse moves the tool; walls are not felt", true));
+        let demonstrations = DEMONSTRATIONS.iter().filter(|(name, _)| program.has_bone() || name.is_empty());
+        let shown = demonstrations.map(|(name, hint)| {
+            let script = if name.is_empty() { program.script() } else { name };
+            (format!("script:{script}"), choosable(&format!("demonstration: {script}"), hint, true))
+        });
+        let is_real =
+            |device: &&Listed| !["mouse", "script", "simulated", "replay"].iter().any(|k| device.name.starts_with(k));
+        let real = self.devices.iter().filter(is_real).map(|device| {
+            (device.name.clone(), choosable(&device.name, &device.state, device.state.starts_with("ready")))
+        });
+        debug_assert!(script::NAMES.contains(&program.script()));
+        [mouse].into_iter().chain(real).chain(shown).collect()
+    }
+
+    /// Index of the chosen device.
+    pub fn device(&self, program: Program) -> usize {
+        self.devices(program).iter().position(|(name, _)| *name == self.settings.device).unwrap_or(0)
+    }
+
+    /// The tools that the operation can begin with.
+    pub fn tools(program: Program) -> Vec<Choosable> {
+        // A tool for the brain needs an open skull.
+        let first = |tool: &trepan_geometry::Tool| program.has_bone() == tool.kind.cuts();
+        let tools = program.tray().iter().filter(|tool| first(tool));
+        tools.map(|tool| Choosable { name: called(tool), open: true, ..Choosable::default() }).collect()
+    }
+
+    /// Qualities, with what they mean.
+    pub fn qualities() -> Vec<Choosable> {
+        let hints = [
+            "measures this machine and takes the best models that it can run",
+            "for slow machines",
+            "for most machines",
+            "for fast machines",
+        ];
+        let of =
+            |(quality, hint): (Quality, &str)| Choosable { name: quality.name().into(), hint: hint.into(), open: true };
+        Quality::ALL.into_iter().zip(hints).map(of).collect()
+    }
+
+    /// Index of the chosen quality.
+    pub fn quality(&self) -> usize {
+        Quality::ALL.iter().position(|quality| quality.name() == self.settings.quality).unwrap_or(0)
+    }
+
+    /// Why the session cannot begin yet; `None` if it can.
+    pub fn lacks(&self, program: Program) -> Option<&'static str> {
+        match &self.case.source {
+            Source::Images { ct: None, .. } if program.has_bone() => Some("open the patient's CT first"),
+            Source::Images { mri: None, .. } if program.has_tissue() => {
+                Some("open an MRI too: this program needs the brain; craniotomy runs without one")
+            }
+            _ => None,
+        }
+    }
+
+    /// The options of a session, on top of those that the program was started with.
+    pub fn options(&self, base: &Options, program: Program) -> Result<Options, SessionError> {
+        let mut options = base.clone();
+        match &self.case.source {
+            Source::BuiltIn => {}
+            Source::Images { ct, mri, register } => {
+                (options.patient.ct, options.patient.mri, options.patient.register) =
+                    (ct.clone(), mri.clone(), *register);
+            }
+            Source::Folder(folder) => options.case = Some(folder.clone()),
+        }
+        // A case folder has its opening already.
+        options.patient.opening = self.case.opening.filter(|_| options.case.is_none()).or(base.patient.opening);
+        options.device = self.devices(program).get(self.device(program)).map(|(name, _)| name.clone());
+        options.quality = Some(Quality::ALL[self.quality()]);
+        if self.settings.flap_mm > 0.0 && program.has_bone() {
+            options.flap = Some(self.settings.flap_mm);
+        }
+        options.first_slot = self.settings.tool.min(Self::tools(program).len().saturating_sub(1));
+        options.person = Some(self.settings.person.clone()).filter(|person| !person.trim().is_empty());
+        options.name = Some(self.session.clone()).filter(|name| !name.trim().is_empty());
+        options.sessions = Some(sessions());
+        options.check()?;
+        Ok(options)
+    }
+
+    /// The options that replay a recording.
+    pub fn replay(&self, base: &Options, program: Program, recording: &Path) -> Result<Options, SessionError> {
+        let options = self.options(base, program)?;
+        let device = Some(format!("replay:{}", recording.display()));
+        Ok(Options { device, quality: base.quality, flap: base.flap, ..options })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[test]
+    fn the_form_becomes_the_flags_of_a_session() {
+        let base = Options::try_parse_from(["x", "--csf-loss", "0.1"]).unwrap();
+        let mut form = Form::default();
+        let usual = form.options(&base, Program::Integrated).unwrap();
+        assert_eq!((usual.device.as_deref(), usual.quality, usual.flap), (Some("mouse"), Some(Quality::Auto), None));
+        assert_eq!((usual.csf_loss, usual.person), (Some(0.1), None));
+        form.settings.device = "script:flap".into();
+        (form.settings.flap_mm, form.settings.person) = (30.0, "Ada".into());
+        form.case.source = Source::Images { ct: Some("ct".into()), mri: None, register: true };
+        assert!(form.lacks(Program::Integrated).is_some() && form.lacks(Program::Craniotomy).is_none());
+        let given = form.options(&base, Program::Integrated).unwrap();
+        assert_eq!(
+            (given.device.as_deref(), given.flap, given.patient.register),
+            (Some("script:flap"), Some(30.0), true)
+        );
+        form.case = Recent { source: Source::Folder("c".into()), opening: Some([0.0; 3]), ..Recent::default() };
+        let folder = form.options(&base, Program::Integrated).unwrap();
+        assert_eq!((folder.case, folder.patient.opening), (Some("c".into()), None));
+        let replay = form.replay(&base, Program::Integrated, Path::new("a.mcap")).unwrap();
+        assert_eq!((replay.device.as_deref(), replay.flap), (Some("replay:a.mcap"), None));
+    }
+}

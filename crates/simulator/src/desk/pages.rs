@@ -1,0 +1,297 @@
+//! The pages of the start page, made from what is filled in.
+
+use crate::desk::action::Action;
+use crate::desk::browse::{Folder, Goal};
+use crate::desk::form::Form;
+use crate::desk::settings::{Recent, Source};
+use crate::error::SessionError;
+use crate::printable::printable;
+use crate::program::Program;
+use std::path::{Path, PathBuf};
+use trepan_render::window::{Amount, Choosable, Item, Page};
+
+/// The first page.
+pub(crate) fn start(program: Program, form: &Form) -> Page<Action> {
+    let begin = match form.lacks(program) {
+        None => Item::main("Start the operation", "loads the case and begins", Action::Begin),
+        Some(why) => Item::closed("Start the operation", why),
+    };
+    let check = match form.lacks(program) {
+        None => Item::button("Check the case in pictures", "CT and MRI, labels, place of the opening", Action::Check),
+        Some(why) => Item::closed("Check the case in pictures", why),
+    };
+    let chosen = Item::Text(format!("Case: {}", printable(&form.case.name)));
+    let lacks = form.lacks(program).map(|why| Item::Note(why.into()));
+    Page {
+        title: "Trepan".into(),
+        line: format!("{}: choose a case and start", what(program)),
+        columns: vec![case(form), session(program, form), more(program)],
+        foot: [begin, check, chosen].into_iter().chain(lacks).collect(),
+        escape: None,
+    }
+}
+
+fn what(program: Program) -> &'static str {
+    match program {
+        Program::Craniotomy => "Drill a patient's skull",
+        Program::Brain => "Probe a patient's brain",
+        Program::Integrated => "Open a patient's skull and probe the brain",
+    }
+}
+
+fn case(form: &Form) -> Vec<Item<Action>> {
+    let mut items = vec![
+        Item::Heading("Case".into()),
+        Item::Row(vec![
+            Item::button("Built-in case", "a head that comes with the program", Action::BuiltIn),
+            Item::button("Open CT...", Goal::Ct.line(), Action::Browse(Goal::Ct)),
+            Item::button("Open MRI...", Goal::Mri.line(), Action::Browse(Goal::Mri)),
+            Item::button("Open case folder...", Goal::Case.line(), Action::Browse(Goal::Case)),
+        ]),
+        Item::Note("Or drop files and folders on this window.".into()),
+    ];
+    items.extend(chosen(&form.case));
+    if !form.settings.recent.is_empty() {
+        items.push(Item::Heading("Recent cases".into()));
+        items.extend(form.settings.recent.iter().enumerate().map(|(at, recent)| self::recent(at, recent)));
+    }
+    items
+}
+
+/// The chosen case: its name, its images and its opening.
+fn chosen(case: &Recent) -> Vec<Item<Action>> {
+    let mut items = Vec::new();
+    if let Source::Images { ct, mri, register } = &case.source {
+        let name = "a name that you know it by; not the patient's";
+        items.push(Item::Field("Name".into(), case.name.clone(), name.into(), Action::Name));
+        for (kind, path) in [("CT", ct), ("MRI", mri)] {
+            items.push(Item::Text(format!("{kind}: {}", path.as_deref().map_or("none yet".into(), described))));
+        }
+        if ct.is_some() && mri.is_some() {
+            let option = |name: &str, hint: &str| Choosable { name: name.into(), hint: hint.into(), open: true };
+            let options = vec![
+                option("as scanned", "both are in one space already"),
+                option("register", "moves the MRI to the CT by mutual information; takes a minute more"),
+            ];
+            items.push(Item::Choice("MRI to CT".into(), options, usize::from(*register), Action::Register));
+        }
+    }
+    if let Some([x, y, z]) = case.opening {
+        items.push(Item::Row(vec![
+            Item::Text(format!("Opening at {x:.0}, {y:.0}, {z:.0} mm (right, front, up)")),
+            Item::button("Usual place", "forgets this place", Action::UsualOpening),
+        ]));
+    }
+    items
+}
+
+/// Describes a file or folder without its name, which may be a patient's.
+fn described(path: &Path) -> String {
+    match std::fs::read_dir(path) {
+        Ok(entries) => format!("a folder of {} entries", entries.count()),
+        Err(_) => match path.metadata() {
+            Ok(file) => format!("a file of {:.1} MB", file.len() as f64 * 1e-6),
+            Err(_) => "it is not there any more".into(),
+        },
+    }
+}
+
+fn recent(at: usize, recent: &Recent) -> Item<Action> {
+    let kind = match &recent.source {
+        Source::BuiltIn => "built-in case".into(),
+        Source::Images { ct, mri, .. } => {
+            let parts = [("CT", ct.is_some()), ("MRI", mri.is_some())];
+            parts.into_iter().filter(|part| part.1).map(|part| part.0).collect::<Vec<_>>().join(" and ")
+        }
+        Source::Folder(_) => "case folder".to_string(),
+    };
+    let hash = recent.hash.get(..8).unwrap_or("not built yet");
+    Item::Row(vec![
+        Item::button(printable(&recent.name), "chooses this case", Action::Recent(at)),
+        Item::Note(format!("{kind}, {hash}")),
+        Item::button("x", "takes it off this list; its files stay", Action::Forget(at)),
+    ])
+}
+
+fn session(program: Program, form: &Form) -> Vec<Item<Action>> {
+    let settings = &form.settings;
+    let devices = form.devices(program).into_iter().map(|device| device.1).collect();
+    let person = "for your learning curve; may stay empty";
+    let mut items = vec![
+        Item::Heading("Session".into()),
+        Item::Field("Your name".into(), settings.person.clone(), person.into(), Action::Person),
+        Item::Field(
+            "Session".into(),
+            form.session.clone(),
+            "a name for its folder; may stay empty".into(),
+            Action::Session,
+        ),
+        Item::Choice("Device".into(), devices, form.device(program), Action::Device),
+        Item::Choice("First tool".into(), Form::tools(program), settings.tool, Action::Tool),
+        Item::Choice("Quality".into(), Form::qualities(), form.quality(), Action::Quality),
+    ];
+    if program.has_bone() {
+        let name =
+            if settings.flap_mm > 0.0 { "planned flap, mm across" } else { "planned flap, mm across; 0: a burr hole" };
+        let amount = Amount { name: name.into(), value: settings.flap_mm, range: [0.0, 90.0], step: 2.0 };
+        items.push(Item::Amount(amount, Action::Flap));
+    }
+    items
+}
+
+fn more(program: Program) -> Vec<Item<Action>> {
+    let first = match program.has_bone() {
+        true => Item::button("Guided first operation", "step by step, about two minutes", Action::Lesson(0)),
+        false => Item::closed("Guided first operation", "it drills: use integrated or craniotomy"),
+    };
+    vec![
+        Item::Heading("Learn".into()),
+        first,
+        Item::button("Lessons...", "steps, targets and pass marks", Action::Lessons),
+        Item::Heading("Look back".into()),
+        Item::button("Sessions...", "results, reports and replays of all sessions", Action::Sessions),
+        Item::button("Replay a recording...", Goal::Recording.line(), Action::Browse(Goal::Recording)),
+        Item::Heading("Keys".into()),
+        Item::Note("F1 in a session lists all keys. Q ends it and writes its report.".into()),
+        Item::button("Quit", "closes the window", Action::Close),
+    ]
+}
+
+/// The page on which a file or folder is chosen.
+pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action> {
+    let path = &folder.path;
+    let up = path.parent().map(|up| Item::button("Up", "the folder above", Action::Into(up.into())));
+    let home = std::env::home_dir().map(|home| Item::button("Home", "your own folder", Action::Into(home)));
+    let top = Item::button("Computer", "the top of all folders", Action::Into(PathBuf::from("/")));
+    let mut places: Vec<Item<Action>> = up.into_iter().chain(home).chain([top]).collect();
+    places.push(Item::Field("Folder".into(), written.into(), "a path".into(), Action::Path));
+    let entry = |name: &String, does: fn(PathBuf, Goal) -> Action| {
+        Item::button(printable(name), String::new(), does(path.join(name), goal))
+    };
+    let folders = folder.folders.iter().map(|name| entry(name, |path, _| Action::Into(path))).collect::<Vec<_>>();
+    let files = folder.files.iter().map(|name| entry(name, |path, goal| Action::Take(goal, path))).collect::<Vec<_>>();
+    let count = folder.files.len();
+    let mut foot = Vec::new();
+    if goal.takes(path, count) {
+        let hint = "reads the series in this folder";
+        foot.push(Item::main("Use this folder", hint, Action::Take(goal, path.clone())));
+    } else if goal != Goal::Recording {
+        foot.push(Item::closed("Use this folder", goal.line()));
+    }
+    foot.push(Item::button("Back", "chooses nothing", Action::Home));
+    foot.extend(folder.fault.clone().map(Item::Note));
+    let of_folders =
+        [Item::Row(places), Item::Heading(format!("Folders: {}", folders.len()))].into_iter().chain(folders);
+    let of_files = [Item::Heading(format!("Files: {count}"))].into_iter().chain(files);
+    Page {
+        title: goal.title().into(),
+        line: goal.line().into(),
+        columns: vec![of_folders.collect(), of_files.collect()],
+        foot,
+        escape: Some(Action::Home),
+    }
+}
+
+/// The page on which a dropped file or folder gets its purpose.
+pub(crate) fn sort(path: &Path) -> Page<Action> {
+    let take = |name: &str, goal| Item::button(name, String::new(), Action::Take(goal, path.into()));
+    Page {
+        title: "What is it?".into(),
+        line: described(path),
+        columns: vec![vec![Item::Row(vec![take("The CT", Goal::Ct), take("The MRI", Goal::Mri)])]],
+        foot: vec![Item::button("Back", "takes nothing", Action::Home)],
+        escape: Some(Action::Home),
+    }
+}
+
+/// The page while a session is loading, or over a draft of its scene.
+pub(crate) fn loading(name: &str, (share, line): (f32, String)) -> Page<Action> {
+    Page {
+        title: format!("Loading {}", printable(name)),
+        line: String::new(),
+        columns: vec![vec![
+            Item::Progress(share, line),
+            Item::button("Cancel", "back to the start page", Action::Cancel),
+        ]],
+        foot: Vec::new(),
+        escape: Some(Action::Cancel),
+    }
+}
+
+/// The page after a session, while its report is written.
+pub(crate) fn writing() -> Page<Action> {
+    Page { title: "Writing the report".into(), line: "pictures, scores, drilled skull".into(), ..Page::default() }
+}
+
+/// The page of an error: what is wrong and what to do. Paths of the images are left out, since they
+/// may name a patient.
+pub(crate) fn fault(fault: &SessionError, source: &Source) -> Page<Action> {
+    let images = match source {
+        Source::Images { ct, mri, .. } => [(ct.as_deref(), "the CT"), (mri.as_deref(), "the MRI")],
+        _ => [(None, ""); 2],
+    };
+    let without = |text: String, (path, name): (Option<&Path>, &str)| match path {
+        Some(path) => text.replace(&path.display().to_string(), name),
+        None => text,
+    };
+    let text = printable(&images.into_iter().fold(fault.to_string(), without));
+    let (problem, remedy) = split(&text);
+    let usual = match fault {
+        SessionError::Internal(_) | SessionError::Picture(_) => {
+            "Try again with quality draft; if it comes again, report it."
+        }
+        _ => "Go back, change it on the start page, and start again.",
+    };
+    let remedy = remedy.map_or_else(|| usual.to_string(), capital);
+    Page {
+        title: "This did not work".into(),
+        line: String::new(),
+        columns: vec![vec![Item::Alert(capital(problem)), Item::Heading("What to do".into()), Item::Text(remedy)]],
+        foot: vec![
+            Item::main("Back to the start page", "your choices are kept", Action::Home),
+            Item::button("Quit", "closes the window", Action::Close),
+        ],
+        escape: Some(Action::Home),
+    }
+}
+
+/// Splits an error into its cause and its remedy.
+fn split(text: &str) -> (&str, Option<&str>) {
+    let at = text.rfind("; ").or_else(|| text.rfind(": give")).or_else(|| text.rfind(": name"));
+    at.map_or((text, None), |at| (&text[..at], Some(text[at + 1..].trim())))
+}
+
+fn capital(text: impl AsRef<str>) -> String {
+    let mut letters = text.as_ref().chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_split_into_cause_and_remedy() {
+        assert_eq!(
+            split("cannot write x: full; give another folder"),
+            ("cannot write x: full", Some("give another folder"))
+        );
+        assert_eq!(split("--flap 91 is out of range: give 0 to 90").1, Some("give 0 to 90"));
+        assert_eq!(split("plain"), ("plain", None));
+        let page = fault(&SessionError::Internal("a thread panicked".into()), &Source::BuiltIn);
+        assert!(matches!(&page.columns[0][0], Item::Alert(text) if text == "A thread panicked"));
+    }
+
+    #[test]
+    fn no_path_of_an_image_is_shown() {
+        let images = Source::Images { ct: Some("/data/Doe^Jane/ct".into()), mri: None, register: false };
+        let mut form =
+            Form { case: Recent { name: "case".into(), source: images, ..Recent::default() }, ..Form::default() };
+        form.settings.recent = vec![form.case.clone()];
+        let broken = SessionError::Case("/data/Doe^Jane/ct: no DICOM picture lies in it; give another".into());
+        assert!(!format!("{:?}", fault(&broken, &form.case.source)).contains("Jane"));
+        let page = start(Program::Integrated, &form);
+        assert!(!format!("{page:?}").contains("Jane"));
+        assert!(format!("{:?}", page.foot).contains("does: None"), "an MRI is missing");
+    }
+}

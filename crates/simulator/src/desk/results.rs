@@ -1,0 +1,113 @@
+//! The result page of a session, the list of all sessions and the list of lessons.
+
+use crate::desk::action::Action;
+use crate::printable::printable;
+use crate::report::debrief::{Debrief, Row};
+use crate::report::kept::Kept;
+use crate::training::Lesson;
+use std::path::Path;
+use trepan_render::window::{Item, Page};
+
+/// The page of a session's result.
+pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Action> {
+    let Some(session) = Kept::of(folder) else {
+        return Page { title: "This session has no summary".into(), foot: vec![home()], ..Page::default() };
+    };
+    let lesson = lessons.iter().find(|lesson| lesson.name == session.lesson);
+    let debrief = Debrief::of(&session.summary, lesson, &session.before(kept));
+    let verdict = match debrief.passed {
+        Some(passed) => Item::Verdict(passed, debrief.headline.clone()),
+        None => Item::Text(debrief.headline.clone()),
+    };
+    let mut items: Vec<Item<Action>> = debrief.lesson.iter().cloned().map(Item::Heading).collect();
+    items.extend([verdict, Item::Table(table(&debrief))]);
+    if debrief.earlier > 0 {
+        items.push(Item::Note(format!(
+            "compared with {} earlier sessions of {}",
+            debrief.earlier,
+            printable(&session.person)
+        )));
+    }
+    items.extend(
+        debrief.curves.iter().map(|(name, values)| Item::Curve(format!("{name}, session by session"), values.clone())),
+    );
+    Page {
+        title: "Result".into(),
+        line: format!("{}, case {}, device {}", printable(&session.title), session.case, session.device),
+        columns: vec![items],
+        foot: vec![
+            home(),
+            Item::button("Open the report", "in the browser, where it can be printed", Action::Report(folder.into())),
+            Item::button("Replay", "shows the session again", Action::Replay(folder.into())),
+            Item::button("All sessions", "", Action::Sessions),
+        ],
+        escape: Some(Action::Home),
+    }
+}
+
+fn table(debrief: &Debrief) -> Vec<Vec<String>> {
+    let heading = ["measure", "value", "limit", "kept", "mean of earlier"].map(String::from);
+    let row = |row: &Row| {
+        let kept = row.passed.map_or("", |passed| if passed { "yes" } else { "no" });
+        vec![row.what.clone(), row.value.clone(), row.limit.clone(), kept.into(), row.earlier.clone()]
+    };
+    [heading.into()].into_iter().chain(debrief.rows.iter().map(row)).collect()
+}
+
+fn home() -> Item<Action> {
+    Item::main("Back to the start page", "your choices are kept", Action::Home)
+}
+
+/// The page of all sessions.
+pub(crate) fn list(kept: &[Kept]) -> Page<Action> {
+    let row = |session: &Kept| {
+        let (title, folder) = (printable(&session.title), session.folder.clone());
+        let more = [&session.person, &session.lesson].into_iter().filter(|text| !text.is_empty());
+        let more: String = more.map(|text| format!(", {}", printable(text))).collect();
+        Item::Row(vec![
+            Item::button(title, "its result", Action::Result(folder.clone())),
+            Item::Note(format!("{}, {}, {}{more}", session.program, session.case, session.device)),
+            Item::button("Report", "in the browser", Action::Report(folder.clone())),
+            Item::button("Replay", "shows it again", Action::Replay(folder)),
+        ])
+    };
+    let rows: Vec<_> = kept.iter().map(row).collect();
+    let none = rows.is_empty().then(|| Item::Text("No session was kept yet.".into()));
+    Page {
+        title: "Sessions".into(),
+        line: format!("{} sessions, the newest first; none is ever overwritten", kept.len()),
+        columns: vec![rows.into_iter().chain(none).collect()],
+        foot: vec![home()],
+        escape: Some(Action::Home),
+    }
+}
+
+/// The page of all lessons; `closed` is why none can begin.
+pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: Option<&str>) -> Page<Action> {
+    let lesson = |(at, lesson): (usize, &Lesson)| {
+        let mine = |kept: &&Kept| kept.lesson == lesson.name && kept.person.trim().eq_ignore_ascii_case(person.trim());
+        let tries = kept.iter().filter(mine);
+        let passed = tries.clone().any(|kept| Debrief::of(&kept.summary, Some(lesson), &[]).passed == Some(true));
+        let state = match (passed, tries.count()) {
+            (true, count) => format!("passed, {count} tries"),
+            (false, 0) => "not tried yet".into(),
+            (false, count) => format!("not passed yet, {count} tries"),
+        };
+        let begin = match closed {
+            None => Item::main("Begin", lesson.about.clone(), Action::Lesson(at)),
+            Some(why) => Item::closed("Begin", why),
+        };
+        [
+            Item::Heading(lesson.title.clone()),
+            Item::Text(lesson.about.clone()),
+            Item::Row(vec![begin, Item::Note(state)]),
+        ]
+    };
+    Page {
+        title: "Lessons".into(),
+        line: "Steps while you operate, pass marks at the end; with the case and the device of the start page".into(),
+        columns: vec![lessons.iter().enumerate().flat_map(lesson).collect()],
+        foot: vec![home()],
+        escape: Some(Action::Home),
+    }
+}

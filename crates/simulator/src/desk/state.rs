@@ -1,0 +1,419 @@
+//! What the window shows, and what its controls do.
+
+use crate::Inputs;
+use crate::batch;
+use crate::case::Case;
+use crate::case::cache::Cache;
+use crate::case::choice::case_to_check;
+use crate::desk::action::Action;
+use crate::desk::browse::{Folder, Goal};
+use crate::desk::check::Check;
+use crate::desk::draft;
+use crate::desk::form::Form;
+use crate::desk::job::{Done, Job, Work};
+use crate::desk::pages;
+use crate::desk::results;
+use crate::desk::settings::{Recent, Source, sessions};
+use crate::error::SessionError;
+use crate::options::Options;
+use crate::program::Program;
+use crate::progress::Progress;
+use crate::report::kept::Kept;
+use crate::run::stop::Stop;
+use crate::session::{Place, Session};
+use crate::training::Lesson;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use trepan_gpu::{Gpu, GpuError};
+use trepan_haptics::Listed;
+use trepan_render::window::{Host, Page, Shown, Stage};
+
+/// What the window shows.
+enum View {
+    /// The start page.
+    Start,
+    /// A folder in which something is looked for.
+    Browse(Goal, Folder, String),
+    /// A page that does not change.
+    Page(Box<Page<Action>>),
+    /// A case in pictures, and why the last click did nothing.
+    Check(Box<Check>, Option<&'static str>),
+    /// A session that is loading, running or writing; its case's name.
+    Session(Job, String),
+    /// Nothing more.
+    Closed,
+}
+
+/// The program behind the window.
+pub(crate) struct Desk {
+    program: Program,
+    base: Options,
+    built_in: Inputs,
+    form: Form,
+    view: View,
+    stage: Stage,
+    device: Result<Gpu, GpuError>,
+    /// Whether the program was started for one session.
+    direct: bool,
+    last: Option<Result<Done, SessionError>>,
+    devices: Receiver<Vec<Listed>>,
+    stop: Stop,
+}
+
+impl Desk {
+    /// Shows the start page.
+    pub fn new(
+        program: Program,
+        base: Options,
+        built_in: Inputs,
+        (stage, device): (Stage, Result<Gpu, GpuError>),
+        stop: Stop,
+    ) -> Self {
+        let (sender, devices) = channel();
+        // Looking for hardware may wait for its drivers. Nobody listens once the window is closed.
+        std::thread::spawn(move || _ = sender.send(trepan_haptics::list()));
+        let form = Form::read(built_in.name);
+        let (view, direct, last) = (View::Start, false, None);
+        Self { program, base, built_in, form, view, stage, device, direct, last, devices, stop }
+    }
+
+    /// Begins the session, or the batch of replays, that the flags name.
+    pub fn begin_directly(mut self) -> Self {
+        self.direct = true;
+        let (program, options, built_in) = (self.program, self.base.clone(), self.built_in.clone());
+        let work: Work = match batch::recordings(&options) {
+            Err(fault) => {
+                self.fail(fault);
+                return self;
+            }
+            Ok(Some(files)) => Box::new(move |place| {
+                let failures = batch::run(program, &options, &built_in, &files, &place);
+                Ok(Done::Batch([failures, files.len()]))
+            }),
+            Ok(None) => session(program, options, built_in),
+        };
+        let name = self.built_in.name.unwrap_or("the session").to_string();
+        self.start(work, name, false, Progress::default());
+        self
+    }
+
+    /// Ends what runs, and returns what the last session came to. Called when the window is closed.
+    pub fn end(self) -> (Option<Job>, Form, Option<Result<Done, SessionError>>) {
+        let job = match self.view {
+            View::Session(job, _) => Some(job),
+            _ => None,
+        };
+        job.iter().filter(|job| !job.is_running()).for_each(Job::cancel);
+        (job, self.form, self.last)
+    }
+
+    fn start(&mut self, work: Work, name: String, again: bool, progress: Progress) {
+        let place = Place { window: Some(self.stage.clone()), drawing: Some(self.device.clone()), progress };
+        self.view = View::Session(Job::start(work, place, again), name);
+    }
+
+    /// Begins a session with what is filled in.
+    fn begin(&mut self, options: Result<Options, SessionError>) {
+        let options = match options {
+            Ok(options) => options,
+            Err(fault) => return self.fail(fault),
+        };
+        let Recent { name, hash, .. } = self.form.case.clone();
+        let cache = Cache::of(&options.patient).ok();
+        let again = cache.as_ref().is_some_and(|cache| !hash.is_empty() && cache.find(&hash).is_some());
+        let progress = Progress::default();
+        if let Some(cache) = cache.filter(|_| again && self.program.has_bone()) {
+            let (stage, device, name) = (self.stage.clone(), self.device.clone(), name.clone());
+            let loading = progress.clone();
+            std::thread::spawn(move || {
+                let shown = draft::show((&cache, &hash), name, device, (&stage, &loading));
+                shown.err().into_iter().for_each(|fault| tracing::debug!("no draft of the scene: {fault}"));
+            });
+        }
+        self.start(session(self.program, options, self.built_in.clone()), name, again, progress);
+    }
+
+    /// Takes what an ended job came to.
+    fn take(&mut self, done: Result<Done, SessionError>) {
+        if let Ok(Done::Case(case)) = done {
+            return self.look_at(*case);
+        }
+        self.view = match &done {
+            Err(SessionError::Cancelled) => View::Start,
+            Err(fault) => View::Page(Box::new(pages::fault(fault, &self.form.case.source))),
+            Ok(_) if self.direct => View::Closed,
+            Ok(Done::Batch(_) | Done::Case(_)) => View::Start,
+            Ok(Done::Session(ended)) => {
+                self.form.case.hash = ended.case.clone().unwrap_or_default();
+                self.form.settings.remember(self.form.case.clone());
+                View::Page(Box::new(results::page(&ended.out, &self.kept(), &lessons())))
+            }
+        };
+        self.keep();
+        self.direct = false;
+        self.last = Some(done);
+    }
+
+    /// Shows a case in pictures.
+    fn look_at(&mut self, case: Case) {
+        let Recent { name, opening, .. } = self.form.case.clone();
+        match Check::of(case, name, opening, self.device.clone()) {
+            Ok(check) => self.view = View::Check(Box::new(check), None),
+            Err(fault) => self.fail(fault),
+        }
+    }
+
+    /// Loads the chosen case to look at it.
+    fn check(&mut self) {
+        let options = match self.form.options(&self.base, self.program) {
+            // A place that was chosen before may not fit: the case is looked at without it.
+            Ok(options) => options,
+            Err(fault) => return self.fail(fault),
+        };
+        let Recent { name, hash, .. } = self.form.case.clone();
+        let (program, built_in, progress) = (self.program, self.built_in.clone(), Progress::default());
+        let loading = progress.clone();
+        let work: Work = Box::new(move |_| {
+            let case = case_to_check(program, &options, built_in, &hash, &loading)?;
+            Ok(Done::Case(Box::new(case)))
+        });
+        self.start(work, name, true, progress);
+    }
+
+    fn fail(&mut self, fault: SessionError) {
+        self.view = View::Page(Box::new(pages::fault(&fault, &self.form.case.source)));
+        self.last = Some(Err(fault));
+    }
+
+    /// Keeps the settings.
+    fn keep(&self) {
+        self.form.settings.write().err().into_iter().for_each(|fault| tracing::warn!("settings: {fault}"));
+    }
+
+    fn kept(&self) -> Vec<Kept> {
+        Kept::list(&[sessions(), PathBuf::from("trepan-out")])
+    }
+
+    fn browse(&mut self, goal: Goal, path: &Path) {
+        let folder = Folder::list(path, goal);
+        let written = path.display().to_string();
+        self.view = View::Browse(goal, folder, written);
+    }
+
+    fn take_path(&mut self, goal: Goal, path: PathBuf) {
+        self.form.settings.folder = path.parent().map(PathBuf::from);
+        self.view = View::Start;
+        let case = &mut self.form.case;
+        match goal {
+            Goal::Recording => self.begin(self.form.replay(&self.base, self.program, &path)),
+            Goal::Case => {
+                *case = Recent { name: "case folder".into(), source: Source::Folder(path), ..Recent::default() };
+            }
+            Goal::Ct | Goal::Mri => {
+                if !matches!(case.source, Source::Images { .. }) {
+                    let source = Source::Images { ct: None, mri: None, register: false };
+                    *case = Recent { name: "my case".into(), source, ..Recent::default() };
+                }
+                let Source::Images { ct, mri, .. } = &mut case.source else { return };
+                *(if goal == Goal::Ct { ct } else { mri }) = Some(path);
+                case.hash.clear();
+            }
+        }
+    }
+
+    /// Replays a session on its case, which is a recent one or the built-in one.
+    fn replay(&mut self, recording: &Path) {
+        let name = Kept::of(recording.parent().unwrap_or(recording)).map(|kept| kept.case);
+        let is =
+            |case: &&Recent| name.as_ref().is_some_and(|name| case.hash.get(..8).is_some_and(|h| name.ends_with(h)));
+        let built_in = || Recent { name: self.built_in.name.unwrap_or_default().into(), ..Recent::default() };
+        self.form.case = self.form.settings.recent.iter().find(is).cloned().unwrap_or_else(built_in);
+        self.begin(self.form.replay(&self.base, self.program, recording));
+    }
+}
+
+fn lessons() -> Vec<Lesson> {
+    Lesson::all(Lesson::folder().as_deref())
+}
+
+/// The work of one session.
+fn session(program: Program, options: Options, built_in: Inputs) -> Work {
+    Box::new(move |place| {
+        let ended = Session::open_in(program, options, built_in, place)?.run()?;
+        Ok(Done::Session(Box::new(ended)))
+    })
+}
+
+impl Host for Desk {
+    type Action = Action;
+
+    fn shown(&mut self, guest: bool) -> Shown<Action> {
+        self.form.devices.extend(self.devices.try_iter().flatten());
+        if self.stop.asked() && !matches!(self.view, View::Session(..)) {
+            return Shown::Nothing;
+        }
+        if let View::Session(job, _) = &self.view
+            && job.is_done()
+            && let View::Session(job, _) = std::mem::replace(&mut self.view, View::Start)
+        {
+            let done = job.end(&mut self.form.settings);
+            self.take(done);
+        }
+        match &self.view {
+            View::Start => Shown::Page(Box::new(pages::start(self.program, &self.form))),
+            View::Browse(goal, folder, written) => Shown::Page(Box::new(pages::browse(*goal, folder, written))),
+            View::Page(page) => Shown::Page(page.clone()),
+            View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault))),
+            View::Session(job, name) => match (job.is_running(), guest) {
+                (true, true) => Shown::Session(None),
+                (true, false) => Shown::Page(Box::new(pages::writing())),
+                (false, true) => Shown::Session(Some(Box::new(pages::loading(name, job.loaded(&self.form.settings))))),
+                (false, false) => Shown::Page(Box::new(pages::loading(name, job.loaded(&self.form.settings)))),
+            },
+            View::Closed => Shown::Nothing,
+        }
+    }
+
+    fn act(&mut self, action: Action) {
+        let (form, settings) = (&mut self.form, |form: &mut Form| form.settings.clone());
+        let before = settings(form);
+        match action {
+            Action::Home => self.view = View::Start,
+            Action::BuiltIn => {
+                let usual = Recent { name: self.built_in.name.unwrap_or_default().into(), ..Recent::default() };
+                let known = form.settings.recent.iter().find(|recent| recent.source == Source::BuiltIn).cloned();
+                form.case = known.unwrap_or(usual);
+            }
+            Action::Recent(at) => form.case = form.settings.recent.get(at).cloned().unwrap_or_default(),
+            Action::Forget(at) if at < form.settings.recent.len() => _ = form.settings.recent.remove(at),
+            Action::Forget(_) => {}
+            Action::Name(name) => form.case.name = name,
+            Action::Register(at) => {
+                if let Source::Images { register, .. } = &mut form.case.source {
+                    *register = at == 1;
+                }
+            }
+            Action::UsualOpening => form.case.opening = None,
+            Action::Session(name) => form.session = name,
+            Action::Person(name) => form.settings.person = name,
+            Action::Device(at) => {
+                form.settings.device =
+                    form.devices(self.program).get(at).map(|device| device.0.clone()).unwrap_or_default();
+            }
+            Action::Tool(at) => form.settings.tool = at,
+            Action::Quality(at) => {
+                form.settings.quality = Form::qualities().get(at).map(|q| q.name.clone()).unwrap_or_default();
+            }
+            Action::Flap(mm) => form.settings.flap_mm = mm,
+            Action::Browse(goal) => {
+                let folder = form.settings.folder.clone().filter(|folder| folder.is_dir());
+                let folder = folder.or_else(std::env::home_dir).unwrap_or_else(|| "/".into());
+                self.browse(goal, &folder);
+            }
+            other => self.leave(other),
+        }
+        if before != self.form.settings {
+            self.keep();
+        }
+    }
+
+    fn dropped(&mut self, path: PathBuf) {
+        match () {
+            () if matches!(self.view, View::Session(..)) => {}
+            () if path.extension().is_some_and(|end| end == "mcap") => self.take_path(Goal::Recording, path),
+            () if path.join("case.json").is_file() => self.take_path(Goal::Case, path),
+            () => self.view = View::Page(Box::new(pages::sort(&path))),
+        }
+    }
+}
+
+impl Desk {
+    /// Does what changes the pictures of a case.
+    fn look(&mut self, action: Action) {
+        let View::Check(check, fault) = &mut self.view else { return };
+        let done = match action {
+            Action::OpenAt(at) => check.open_at(at).map(|found| {
+                *fault =
+                    (!found).then_some("There is no bone under this click: turn the head, then click on the skull");
+            }),
+            Action::Turn(by) => check.turn(by),
+            Action::Blend(share) => {
+                check.blend(share);
+                Ok(())
+            }
+            Action::Slide(axis, mm) => {
+                check.slide(axis, mm);
+                Ok(())
+            }
+            _ => Ok(()),
+        };
+        if self.form.case.opening != check.opening {
+            self.form.case.opening = check.opening;
+            // The case is built anew for another opening.
+            self.form.case.hash.clear();
+        }
+        done.err().into_iter().for_each(|fault| self.fail(fault));
+    }
+
+    /// Does what leads to another page.
+    fn leave(&mut self, action: Action) {
+        match action {
+            Action::Into(path) => {
+                if let View::Browse(goal, ..) = self.view {
+                    self.browse(goal, &path);
+                }
+            }
+            Action::Path(text) => {
+                if let View::Browse(goal, folder, written) = &mut self.view {
+                    let path = PathBuf::from(&text);
+                    if path.is_dir() {
+                        *folder = Folder::list(&path, *goal);
+                    }
+                    *written = text;
+                }
+            }
+            Action::Take(goal, path) => self.take_path(goal, path),
+            Action::Begin => self.begin(self.form.options(&self.base, self.program)),
+            Action::Cancel => {
+                if let View::Session(job, _) = &self.view {
+                    job.cancel();
+                    self.view = View::Start;
+                }
+            }
+            Action::Lessons => {
+                let (closed, person) = (self.form.lacks(self.program), &self.form.settings.person);
+                self.view = View::Page(Box::new(results::lessons(&lessons(), &self.kept(), person, closed)));
+            }
+            Action::Lesson(at) => {
+                let options = self.form.options(&self.base, self.program);
+                let lesson = lessons().get(at).map(|lesson| lesson.name.clone());
+                // The lesson brings its own flap.
+                self.begin(options.map(|options| Options { lesson, flap: self.base.flap, ..options }));
+            }
+            Action::Check => self.check(),
+            Action::OpenAt(_) | Action::Turn(_) | Action::Blend(_) | Action::Slide(..) => self.look(action),
+            Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept()))),
+            Action::Result(folder) => {
+                self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
+            }
+            Action::Report(folder) => open(&folder.join("report.html")),
+            Action::Replay(folder) => self.replay(&folder.join("session.mcap")),
+            Action::Close => self.view = View::Closed,
+            _ => {}
+        }
+    }
+}
+
+/// Opens a page in the user's browser.
+fn open(page: &Path) {
+    let opener = if cfg!(target_os = "macos") {
+        "open"
+    } else if cfg!(windows) {
+        "explorer"
+    } else {
+        "xdg-open"
+    };
+    let begun = Command::new(opener).arg(page).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    begun.err().into_iter().for_each(|fault| tracing::warn!("{opener}: {fault}; open {} by hand", page.display()));
+}

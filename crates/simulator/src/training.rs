@@ -1,0 +1,228 @@
+//! Lessons as data: steps with targets for the session, pass marks for its result.
+//!
+//! # Practice
+//! A lesson is a JSON file: those of the program lie in `lessons/`, the user's own in the folder
+//! `lessons` beside the settings. Targets of steps are read from the running session, pass marks
+//! from its summary. The limits are a teacher's choice; none is validated against clinical skill.
+
+use crate::run::View;
+use etcetera::{BaseStrategy, choose_base_strategy};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A lesson.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Lesson {
+    /// Short name, as in summaries.
+    pub name: String,
+    /// Title.
+    pub title: String,
+    /// What is learnt, in a sentence.
+    pub about: String,
+    /// Diameter of the planned flap, mm; 0 for a burr hole.
+    #[serde(default)]
+    pub flap_mm: f32,
+    /// The tool at the start, by its place in the tray.
+    #[serde(default)]
+    pub slot: usize,
+    /// What to do, in order.
+    pub steps: Vec<Step>,
+    /// What the result must keep.
+    pub marks: Vec<Mark>,
+}
+
+/// One step of a lesson.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Step {
+    /// What to do.
+    pub text: String,
+    /// What is measured to end the step.
+    pub until: Measure,
+    /// The step ends at this value or more.
+    pub least: Option<f64>,
+    /// The step ends at this value or less.
+    pub most: Option<f64>,
+}
+
+/// What is measured in a running session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Measure {
+    /// Depth in bone, mm.
+    BoneDepthMm,
+    /// Depth in tissue, mm.
+    TissueDepthMm,
+    /// Distance from the tool to the brain, mm.
+    BrainMm,
+    /// Bone removed, mm³.
+    RemovedMm3,
+    /// Force on the hand, N.
+    ForceN,
+    /// Place of the tool in the tray.
+    Slot,
+    /// Nothing: the last step.
+    Never,
+}
+
+/// A pass mark.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Mark {
+    /// What is measured.
+    pub text: String,
+    /// Where it stands in the summary: keys with points between them.
+    pub path: String,
+    /// Its unit; empty for a count.
+    #[serde(default)]
+    pub unit: String,
+    /// Smallest value that passes.
+    pub least: Option<f64>,
+    /// Largest value that passes.
+    pub most: Option<f64>,
+}
+
+/// Lessons of the program.
+const OWN: [&str; 3] = [
+    include_str!("../lessons/1-first-operation.json"),
+    include_str!("../lessons/2-straight-through.json"),
+    include_str!("../lessons/3-flap.json"),
+];
+
+impl Lesson {
+    /// Folder of the user's own lessons: `lessons` in `TREPAN_CONFIG`, else in the configuration
+    /// folder.
+    pub fn folder() -> Option<PathBuf> {
+        let named = std::env::var_os("TREPAN_CONFIG").filter(|folder| !folder.is_empty()).map(PathBuf::from);
+        let of_user = || Some(choose_base_strategy().ok()?.config_dir().join("trepan"));
+        named.or_else(of_user).map(|folder| folder.join("lessons"))
+    }
+
+    /// Lists the lessons of the program and those in a folder; files that are none are logged.
+    pub fn all(folder: Option<&Path>) -> Vec<Self> {
+        let own = OWN.iter().filter_map(|text| serde_json::from_str(text).ok());
+        let mut files: Vec<_> = folder
+            .and_then(|folder| fs::read_dir(folder).ok())
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|e| e.path())
+            .collect();
+        files.sort();
+        let read = |file: &PathBuf| {
+            let read = fs::read(file).map_err(|fault| fault.to_string());
+            let lesson = read.and_then(|json| serde_json::from_slice(&json).map_err(|fault| fault.to_string()));
+            lesson.inspect_err(|fault| tracing::warn!("lesson {}: {fault}", file.display())).ok()
+        };
+        own.chain(files.iter().filter_map(read)).collect()
+    }
+}
+
+impl Step {
+    /// Whether a running session has reached the target.
+    fn is_reached(&self, view: &View) -> bool {
+        let value = match self.until {
+            Measure::BoneDepthMm => view.depth_mm[0].into(),
+            Measure::TissueDepthMm => view.depth_mm[1].into(),
+            Measure::BrainMm => view.brain_distance_mm.into(),
+            Measure::RemovedMm3 => view.removed_mm3,
+            Measure::ForceN => view.force.length().into(),
+            Measure::Slot => view.sample.slot as f64,
+            Measure::Never => return false,
+        };
+        within(value, self.least, self.most)
+    }
+}
+
+impl Mark {
+    /// The value in a summary; `None` where it has none.
+    pub fn value(&self, summary: &Value) -> Option<f64> {
+        self.path.split('.').fold(summary, |value, key| &value[key]).as_f64()
+    }
+
+    /// Whether a value passes; a missing one does not.
+    pub fn passes(&self, value: Option<f64>) -> bool {
+        value.is_some_and(|value| within(value, self.least, self.most))
+    }
+
+    /// The limit in words: "at most 1 mm".
+    pub fn limit(&self) -> String {
+        let bound =
+            |word: &str, value: Option<f64>| value.map(|value| format!("{word} {value} {}", self.unit).trim().into());
+        let bounds: Vec<String> =
+            [bound("at least", self.least), bound("at most", self.most)].into_iter().flatten().collect();
+        bounds.join(", ")
+    }
+}
+
+fn within(value: f64, least: Option<f64>, most: Option<f64>) -> bool {
+    least.is_none_or(|least| value >= least) && most.is_none_or(|most| value <= most)
+}
+
+/// A lesson while its session runs.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Guide {
+    lesson: Lesson,
+    at: usize,
+}
+
+impl Guide {
+    /// Begins with the first step.
+    pub fn new(lesson: Lesson) -> Self {
+        Self { lesson, at: 0 }
+    }
+
+    /// Goes on to the next step once the present one is reached; returns the text of the present
+    /// one.
+    pub fn follow(&mut self, view: &View) -> String {
+        let count = self.lesson.steps.len();
+        if self.lesson.steps.get(self.at).is_some_and(|step| step.is_reached(view)) && self.at + 1 < count {
+            self.at += 1;
+        }
+        let text = self.lesson.steps.get(self.at).map_or("", |step| &step.text);
+        format!("Step {} of {count}: {text}", self.at + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::program::Program;
+    use crate::stages::haptic_tick::ToolSample;
+    use trepan_geometry::{Pose, ToolState};
+
+    #[test]
+    fn every_lesson_of_the_program_can_be_read_and_ends() {
+        let lessons = Lesson::all(None);
+        assert_eq!(lessons.len(), OWN.len());
+        for lesson in &lessons {
+            assert_eq!(lesson.steps.last().map(|step| step.until), Some(Measure::Never), "{}", lesson.name);
+            assert!(
+                lesson.slot < 4 && !lesson.marks.is_empty() && lesson.marks.iter().all(|mark| !mark.limit().is_empty())
+            );
+        }
+    }
+
+    #[test]
+    fn steps_go_on_when_their_target_is_reached() {
+        let state = ToolState::at(Pose::IDENTITY);
+        let sample = ToolSample { tick: 0, state, tool: Program::Integrated.tray()[0], slot: 0, drilling: false };
+        let mut view = View::at(sample, 1.0);
+        let mut guide = Guide::new(Lesson::all(None).remove(0));
+        assert!(guide.follow(&view).starts_with("Step 1 of 6"));
+        view.depth_mm[0] = 0.1;
+        assert!(guide.follow(&view).starts_with("Step 2"));
+        assert!(guide.follow(&view).starts_with("Step 2"), "nothing is removed yet");
+        view.removed_mm3 = 50.0;
+        assert!(guide.follow(&view).starts_with("Step 3"));
+    }
+
+    #[test]
+    fn a_mark_is_read_by_its_path_and_a_missing_value_does_not_pass() {
+        let mark =
+            Mark { text: "t".into(), path: "plan.dice".into(), unit: "mm".into(), least: Some(0.5), most: Some(2.0) };
+        let value = mark.value(&serde_json::json!({ "plan": { "dice": 0.7 } }));
+        assert!(mark.passes(value) && !mark.passes(Some(3.0)) && !mark.passes(mark.value(&Value::Null)));
+        assert_eq!(mark.limit(), "at least 0.5 mm, at most 2 mm");
+    }
+}
