@@ -16,7 +16,7 @@
 use crate::law::{Deformation, Stress};
 use trepan_soft::simd::{Lane, dot, squared};
 
-/// The bound A times rest volume, N mm. It takes the isochoric stress, μ V and κ V, and `J̄ - 1 - p`
+/// The bound A times rest volume, N mm. It takes isochoric stress, μ V and κ V, and `J̄ - 1 - p`
 /// with the slope of p against -J.
 #[inline(always)]
 pub(crate) fn stiffness<L: Lane>(
