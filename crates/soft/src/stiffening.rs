@@ -22,9 +22,9 @@
 //! Methods Appl. Mech. Eng. 283 (2015).
 //!
 //! # When not to use it
-//! Where bodies are crushed flat: a block comes back from 30 % of its height, as it does not with
-//! Ogden's law, but not from a twentieth, from which a neo-Hookean one does
-//! (`cargo test -p trepan-tled --test materials`).
+//! Where a whole body may be turned inside out. A block comes back from a twentieth of its height
+//! and with a tenth of its elements inside out, but not mirrored whole, from which a neo-Hookean
+//! one does (`cargo xtask validate tled --quick`, its map). Ogden's law comes back from less.
 
 use crate::energy::{NeoHookean, VolumeWall, cofactor, cofactor_change, dot, power, volumetric};
 use glam::DMat3;
