@@ -102,10 +102,11 @@ fn within(side: Side, value: f64, limit: f64) -> bool {
 }
 
 impl Register {
-    /// Reads the register of a suite and what all suites share; an absent file is an empty one.
+    /// Reads what all suites share and the register of a suite. Its own entries come before the
+    /// shared ones; an absent file is an empty one.
     pub fn of(suite: &str) -> Result<Self> {
-        let mut register = Self::read(suite)?;
-        register.limits.extend(Self::read(COMMON)?.limits);
+        let mut register = Self::read(COMMON)?;
+        register.limits.extend(Self::read(suite)?.limits);
         Ok(register)
     }
 
@@ -118,7 +119,8 @@ impl Register {
         }
     }
 
-    /// Entry of a limit: among those that fit its name, the one with the most literal characters.
+    /// Entry of a limit: among those that fit its name, the one with the most literal characters,
+    /// and of equal ones the last.
     pub fn entry(&self, gate: &Gate) -> Option<&Limit> {
         let fits = self.limits.iter().filter(|limit| limit.side == gate.op && fits(&limit.gate, &gate.name));
         fits.max_by_key(|limit| limit.gate.chars().filter(|c| *c != '*').count())
