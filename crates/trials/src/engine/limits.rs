@@ -102,12 +102,14 @@ fn within(side: Side, value: f64, limit: f64) -> bool {
 }
 
 impl Register {
-    /// Reads what all suites share and the register of a suite. Its own entries come before the
-    /// shared ones; an absent file is an empty one.
+    /// Reads the register of a suite and what all suites share; an absent file is an empty one. An
+    /// entry of the suite's own, with its own known gaps, stands for the shared one of that name.
     pub fn of(suite: &str) -> Result<Self> {
-        let mut register = Self::read(COMMON)?;
-        register.limits.extend(Self::read(suite)?.limits);
-        Ok(register)
+        let mut limits = Self::read(suite)?.limits;
+        let mut shared = Self::read(COMMON)?.limits;
+        shared.retain(|common| !limits.iter().any(|own| own.gate == common.gate && own.side == common.side));
+        limits.extend(shared);
+        Ok(Self { limits })
     }
 
     fn read(name: &str) -> Result<Self> {
@@ -119,8 +121,7 @@ impl Register {
         }
     }
 
-    /// Entry of a limit: among those that fit its name, the one with the most literal characters,
-    /// and of equal ones the last.
+    /// Entry of a limit: among those that fit its name, the one with the most literal characters.
     pub fn entry(&self, gate: &Gate) -> Option<&Limit> {
         let fits = self.limits.iter().filter(|limit| limit.side == gate.op && fits(&limit.gate, &gate.name));
         fits.max_by_key(|limit| limit.gate.chars().filter(|c| *c != '*').count())
