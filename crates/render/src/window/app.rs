@@ -204,7 +204,7 @@ impl<S: Session, D: Draws> Window<S, D> {
     fn numbered(&self, input: &egui::InputState) -> Option<[usize; 2]> {
         let slot = answers::NUMBERS.iter().position(|key| input.key_pressed(*key))?;
         let choice = self.panel.choices.first().filter(|choice| !choice.tools.is_empty())?;
-        let open = choice.options.get(slot).is_some_and(|(_, open)| *open) && choice.chosen != slot;
+        let open = choice.options.get(slot).is_some_and(|(_, why_not)| why_not.is_none()) && choice.chosen != slot;
         open.then_some([0, slot])
     }
 
@@ -240,7 +240,13 @@ impl<S: Session, D: Draws> Window<S, D> {
                 self.lead(ui, &response, &view, &shared.session);
                 let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
                 let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
-                ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, self.quality.text(), font, grey);
+                ui.painter().text(
+                    corner,
+                    egui::Align2::LEFT_BOTTOM,
+                    super::words::tr(&self.quality.text()),
+                    font,
+                    grey,
+                );
                 shared.shown = true;
             }
         }

@@ -2,6 +2,7 @@
 
 use super::Action;
 use super::palette::SKY;
+use super::words::tr;
 use eframe::egui::{self, Key, RichText};
 
 /// A command of the user to the window.
@@ -96,7 +97,7 @@ pub(crate) fn name(command: Command) -> &'static str {
 /// Button label of a command with its key.
 pub(crate) fn label(command: Command) -> String {
     let found = KEYS.iter().find(|(_, c, _)| *c == command);
-    found.map_or_else(String::new, |(key, _, words)| format!("{words} ({})", key.symbol_or_name()))
+    found.map_or_else(String::new, |(key, _, words)| format!("{} ({})", tr(words), tr(key.symbol_or_name())))
 }
 
 /// The key of a session's own action.
@@ -107,13 +108,13 @@ pub(crate) fn of_action(action: &Action) -> Option<Key> {
 /// The help page over the picture.
 pub(crate) fn help(context: &egui::Context, actions: &[Action]) {
     let centre = egui::Align2::CENTER_CENTER;
-    let page = egui::Window::new("Keys and mouse").collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);
+    let page = egui::Window::new(tr("Keys and mouse")).collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);
     page.show(context, |ui| {
         egui::ScrollArea::vertical().show(ui, |ui| {
             egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
                 let mut row = |key: &str, words: &str| {
-                    ui.label(RichText::new(key).monospace().color(SKY));
-                    ui.label(words);
+                    ui.label(RichText::new(tr(key)).monospace().color(SKY));
+                    ui.label(tr(words));
                     ui.end_row();
                 };
                 REST.iter().for_each(|(key, words)| row(key, words));

@@ -59,14 +59,16 @@ mod synthesis;
 mod tests;
 mod timeline;
 mod tool_icon;
+mod words;
 
 pub use capture::Capture;
 pub use draws::{Draws, Refined};
-pub use host::{Host, Offers, Shown, Stage, open, stage};
+pub use host::{Host, Offers, Pages, Shown, Stage, open, stage};
 pub use input::WindowInput;
 pub use page::{Amount, Button, Choosable, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};
+pub use words::{Language, missing, speak};
 
 use crate::{Camera, Frame, Image, Renderer};
 use std::any::Any;

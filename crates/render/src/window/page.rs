@@ -9,6 +9,7 @@
 //! For a running session: its picture and panel are a [`Session`](super::Session).
 
 use super::palette::{GREEN, ORANGE, PALE, SKY, VERMILION};
+use super::words::tr;
 use crate::Image;
 use eframe::egui::{self, Color32, RichText};
 use std::sync::Arc;
@@ -175,9 +176,9 @@ pub(crate) fn show<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut T
         done.extend(page.escape.clone());
     }
     ui.add_space(10.0);
-    ui.label(RichText::new(&page.title).size(26.0).strong());
+    ui.label(RichText::new(tr(&page.title)).size(26.0).strong());
     if !page.line.is_empty() {
-        ui.label(RichText::new(&page.line).size(15.0).color(PALE));
+        ui.label(RichText::new(tr(&page.line)).size(15.0).color(PALE));
     }
     ui.separator();
     if !page.foot.is_empty() {
@@ -214,22 +215,22 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
     match item {
         Item::Heading(text) => {
             ui.add_space(8.0);
-            ui.label(RichText::new(text).size(18.0).strong().color(SKY));
+            ui.label(RichText::new(tr(text)).size(18.0).strong().color(SKY));
         }
-        Item::Text(text) => _ = ui.label(RichText::new(text).size(15.0).color(INK)),
-        Item::Note(text) => _ = ui.label(RichText::new(text).color(PALE)),
+        Item::Text(text) => _ = ui.label(RichText::new(tr(text)).size(15.0).color(INK)),
+        Item::Note(text) => _ = ui.label(RichText::new(tr(text)).color(PALE)),
         Item::Verdict(passed, text) => {
             let colour = if *passed { GREEN } else { ORANGE };
-            ui.label(RichText::new(text).size(18.0).strong().color(colour));
+            ui.label(RichText::new(tr(text)).size(18.0).strong().color(colour));
         }
         Item::Label(text, [r, g, b]) => {
             let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
             ui.painter().rect_filled(patch, 2.0, Color32::from_rgb(*r, *g, *b));
-            ui.label(RichText::new(text).color(INK));
+            ui.label(RichText::new(tr(text)).color(INK));
         }
         Item::Alert(text) => {
             egui::Frame::new().fill(VERMILION).inner_margin(10.0).show(ui, |ui| {
-                ui.label(RichText::new(text).size(16.0).strong().color(Color32::BLACK));
+                ui.label(RichText::new(tr(text)).size(16.0).strong().color(Color32::BLACK));
             });
         }
         Item::Button(button) => press(ui, button, done),
@@ -240,13 +241,13 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         Item::Field(name, value, empty, does) => write(ui, [name, value, empty], *does, done),
         Item::Amount(amount, does) => {
             let (mut value, [low, high]) = (amount.value, amount.range);
-            let slider = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into()).text(&amount.name);
+            let slider = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into()).text(tr(&amount.name));
             if ui.add(slider).changed() {
                 done.push(does(value));
             }
         }
         Item::Progress(share, text) => {
-            ui.add(egui::ProgressBar::new(*share).text(text).animate(true).desired_height(22.0));
+            ui.add(egui::ProgressBar::new(*share).text(tr(text)).animate(true).desired_height(22.0));
         }
         Item::Picture(picture) => look(ui, picture, textures, done),
         Item::Table(rows) => table(ui, rows),
@@ -255,7 +256,7 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
 }
 
 fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {
-    let mut text = RichText::new(&button.name).size(15.0);
+    let mut text = RichText::new(tr(&button.name)).size(15.0);
     let mut shape = egui::Button::new(text.clone()).wrap().min_size(egui::vec2(44.0, 30.0));
     if button.main {
         text = text.strong().color(Color32::BLACK);
@@ -266,7 +267,7 @@ fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {
         done.extend(button.does.clone());
     }
     if !button.hint.is_empty() {
-        shown.on_hover_text(&button.hint).on_disabled_hover_text(&button.hint);
+        shown.on_hover_text(tr(&button.hint)).on_disabled_hover_text(tr(&button.hint));
     }
 }
 
@@ -277,15 +278,15 @@ fn choose<A>(
     done: &mut Vec<A>,
 ) {
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(name).color(PALE));
+        ui.label(RichText::new(tr(name)).color(PALE));
         for (at, option) in options.iter().enumerate() {
-            let shape = egui::Button::selectable(at == chosen, &option.name).min_size(egui::vec2(0.0, 26.0));
+            let shape = egui::Button::selectable(at == chosen, tr(&option.name)).min_size(egui::vec2(0.0, 26.0));
             let shown = ui.add_enabled(option.open || at == chosen, shape);
             if shown.clicked() && at != chosen {
                 done.push(does(at));
             }
             if !option.hint.is_empty() {
-                shown.on_hover_text(&option.hint).on_disabled_hover_text(&option.hint);
+                shown.on_hover_text(tr(&option.hint)).on_disabled_hover_text(tr(&option.hint));
             }
         }
     });
@@ -293,10 +294,10 @@ fn choose<A>(
 
 fn write<A>(ui: &mut egui::Ui, [name, value, empty]: [&String; 3], does: fn(String) -> A, done: &mut Vec<A>) {
     ui.horizontal_wrapped(|ui| {
-        let label = ui.label(RichText::new(name).color(PALE));
+        let label = ui.label(RichText::new(tr(name)).color(PALE));
         let mut text = value.clone();
         let width = ui.available_width().clamp(120.0, 420.0);
-        let edit = egui::TextEdit::singleline(&mut text).hint_text(empty.as_str()).desired_width(width);
+        let edit = egui::TextEdit::singleline(&mut text).hint_text(tr(empty)).desired_width(width);
         if ui.add(edit).labelled_by(label.id).changed() {
             done.push(does(text));
         }
@@ -312,7 +313,7 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, textures: &mut Textures, don
     let (area, response) = ui.allocate_exact_size(size, egui::Sense::click_and_drag());
     let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
     ui.painter().image(id, area, whole, Color32::WHITE);
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &picture.name));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, tr(&picture.name)));
     for ([x, y], letter) in &picture.letters {
         let at = area.min + egui::vec2(x * area.width(), y * area.height());
         let font = egui::FontId::proportional(16.0);
@@ -331,7 +332,7 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, textures: &mut Textures, don
 
 fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
     ui.add_space(8.0);
-    ui.label(RichText::new(title).strong());
+    ui.label(RichText::new(tr(title)).strong());
     let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(at, value)| [at as f64 + 1.0, *value]).collect();
     let still = egui_plot::Plot::new(title).height(120.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
     still.show(ui, |plot| {
@@ -345,7 +346,7 @@ fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {
     egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).show(ui, |ui| {
         for (at, row) in rows.iter().enumerate() {
             for cell in row {
-                let text = RichText::new(cell).size(14.0).color(INK);
+                let text = RichText::new(tr(cell)).size(14.0).color(INK);
                 ui.label(if at == 0 { text.strong() } else { text });
             }
             ui.end_row();

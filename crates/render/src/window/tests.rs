@@ -266,7 +266,8 @@ fn the_microscope_looks_straight_down_and_back_again() {
 
 #[test]
 fn an_open_option_is_chosen_and_a_closed_one_is_not() {
-    let options = [("burr 4 mm", true), ("burr 6 mm", true), ("perforator", false)].map(|(n, o)| (n.to_string(), o));
+    let options = [("burr 4 mm", None), ("burr 6 mm", None), ("perforator", Some("not now"))];
+    let options = options.map(|(name, why_not)| (name.to_string(), why_not.map(String::from)));
     let choice = Choice { name: "Tool".into(), options: options.into(), ..Choice::default() };
     let mut bench = Bench::with(Panel { choices: vec![Choice::default(), choice], ..Panel::default() });
     assert_eq!(bench.click("burr 6 mm").chosen, Some([1, 1]));
@@ -414,7 +415,7 @@ fn arrow_keys_move_the_tool_unless_a_slider_has_them() {
 #[test]
 fn every_key_answers_on_screen_whether_it_applies_or_not() {
     let tools = vec![Tool::burr(3.0), Tool::probe(2.0)];
-    let options = vec![("burr".into(), true), ("probe".into(), false)];
+    let options = vec![("burr".into(), None), ("probe".into(), Some("the bone is not open".into()))];
     let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
     let flap = Action { name: "Lift".into(), key: Some('f'), why_not: Some("no flap".into()), ..Action::default() };
     let refused = Some("nothing yet".to_string());
@@ -457,12 +458,12 @@ fn what_cannot_be_used_is_grey_and_does_nothing() {
 #[test]
 fn number_keys_take_tools() {
     let tools = vec![Tool::burr(3.0), Tool::craniotome(), Tool::probe(2.0)];
-    let options = ["burr", "craniotome", "probe"].map(|name| (name.to_string(), true)).into();
+    let options = ["burr", "craniotome", "probe"].map(|name| (name.to_string(), None)).into();
     let choices = vec![Choice { name: "Tool".into(), options, chosen: 0, tools }];
     let mut bench = Bench::with(Panel { by_hand: true, choices, ..Panel::default() });
     assert_eq!(bench.press(Key::Num2).chosen, Some([0, 1]));
     assert_eq!(bench.press(Key::Num1).chosen, None);
-    assert!(bench.shows("the burr is in the hand"));
+    assert!(bench.shows("it is in the hand: burr"));
     assert_eq!(bench.click("3  probe").chosen, Some([0, 2]));
     bench.press(Key::Num7);
     assert!(bench.shows("there is no tool number 7"));
@@ -475,7 +476,7 @@ fn no_control_is_out_of_reach_on_small_and_large_screens() {
     let timeline =
         Timeline { at_s: 3.0, length_s: 10.0, ready_s: 5.0, running: false, speed: 1.0, marks: marks.into() };
     let tools = vec![Tool::burr(3.0), Tool::craniotome(), Tool::perforator()];
-    let options = ["burr 6 mm", "craniotome", "perforator 11 mm"].map(|name| (name.to_string(), true)).into();
+    let options = ["burr 6 mm", "craniotome", "perforator 11 mm"].map(|name| (name.to_string(), None)).into();
     let choices = vec![Choice { name: "Tool".into(), options, chosen: 0, tools }];
     let full = Panel { by_hand: true, choices, timeline: Some(timeline), ..Panel::default() };
     for (size, scale) in [

@@ -10,6 +10,8 @@ mod browse;
 mod check;
 mod draft;
 mod form;
+#[cfg(test)]
+mod gallery;
 mod job;
 mod pages;
 mod results;

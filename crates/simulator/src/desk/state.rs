@@ -50,7 +50,7 @@ pub(crate) struct Desk {
     program: Program,
     base: Options,
     built_in: Inputs,
-    form: Form,
+    pub(super) form: Form,
     view: View,
     stage: Stage,
     device: Result<Gpu, GpuError>,

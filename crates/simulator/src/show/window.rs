@@ -81,7 +81,8 @@ impl Shown {
     pub fn panel(&self, view: &View, by_hand: bool) -> Panel {
         let mut panel = notice_text::panel(&self.case, self.program, view);
         if !by_hand {
-            panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
+            let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
+            options.for_each(|(_, why_not)| *why_not = Some(NOT_IN_HAND.into()));
         }
         panel
     }
@@ -365,6 +366,9 @@ impl Lesson {
         Self { warnings: trouble.map(|(_, text)| text.into()).collect(), ..Self::default() }
     }
 }
+
+/// Why no tool can be taken here.
+const NOT_IN_HAND: &str = "another device, a script or a recording moves the tool";
 
 /// Hint for a teacher.
 const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";

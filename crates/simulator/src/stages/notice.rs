@@ -208,6 +208,9 @@ pub struct Notice {
 }
 
 impl Notice {
+    /// Why no tool for the brain is taken.
+    pub const NOT_OPEN: &'static str = "the bone is not open: drill through it or lift the flap first";
+
     /// Returns kind and text, as recorded.
     pub fn words(&self) -> (&'static str, String) {
         match self.what {
@@ -228,7 +231,7 @@ impl Notice {
             What::NotChanged => ("refused", format!("the tool stays in the hand: {}", Hindrance::Touches.text())),
             What::FlapWaits(why) => ("refused", format!("the flap stays: {}", why.text())),
             What::NoFlap => ("refused", "no flap is planned: start with --flap and its diameter, mm".into()),
-            What::NotOpen => ("refused", "the bone is not open: drill through it or lift the flap first".into()),
+            What::NotOpen => ("refused", Self::NOT_OPEN.into()),
             What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
             What::FlapHangs => ("refused", "the flap is still attached to the skull: cut it free first".into()),
             What::FlapLifted(mm3) => ("flap", format!("the flap is lifted: {mm3:.0} mm3 of bone")),

@@ -1,0 +1,207 @@
+//! Every page of the three programs at every size: no control is out of reach. With
+//! `TREPAN_GALLERY` as the name of a folder the pages are kept there as pictures.
+
+use super::*;
+use crate::desk::action::Action;
+use crate::desk::browse::Goal;
+use crate::desk::settings::{Recent, Source};
+use crate::{Inputs, TissueSource};
+use clap::Parser;
+use egui_kittest::Harness;
+use egui_kittest::kittest::{By, NodeT, Queryable};
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use trepan_gpu::GpuError;
+use trepan_render::Image;
+use trepan_render::window::{Host, Pages};
+
+/// Sizes of the window, pixels, and its scale.
+const SIZES: [([f32; 2], f32); 4] =
+    [([1024.0, 700.0], 1.0), ([1280.0, 800.0], 1.0), ([1920.0, 1080.0], 1.0), ([1280.0, 800.0], 2.0)];
+
+/// A program in a window that a test looks at.
+pub(crate) struct Gallery {
+    window: Harness<'static, Pages<Desk>>,
+    program: Program,
+    home: PathBuf,
+    /// What is cut off.
+    cut: Vec<String>,
+}
+
+impl Gallery {
+    fn open(program: Program, home: &Path) -> Self {
+        for (name, folder) in [("TREPAN_CONFIG", "config"), ("TREPAN_SESSIONS", "sessions")] {
+            #[expect(unsafe_code, reason = "the folders of a program that runs in this process")]
+            // SAFETY: no other test of this process runs a program in a window.
+            unsafe {
+                std::env::set_var(name, home.join(folder));
+            }
+        }
+        let case = trepan_fixtures::case_head();
+        let tissues = TissueSource::regions_of_aseg(case.aseg);
+        let (ct, mri, labels) = (Some(case.ct), Some(case.mri), Some(case.labels));
+        let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues };
+        let options = Options::try_parse_from(["x", "--quality", "draft"]).unwrap();
+        let (stage, offers) = window::stage();
+        let desk = Desk::new(program, options, built_in, (stage, Err(GpuError::NoAdapter)), Stop::default());
+        let pages = Pages::undisplayed(offers, desk);
+        let mut harness = Harness::builder().with_size([1280.0, 800.0]);
+        if std::env::var_os("TREPAN_GALLERY").is_some() {
+            harness = harness.wgpu();
+        }
+        let window = harness.build_ui_state(|ui, pages: &mut Pages<Desk>| pages.draw(ui), pages);
+        Self { window, program, home: home.into(), cut: Vec::new() }
+    }
+
+    /// Does what a control does.
+    fn act(&mut self, action: Action) {
+        self.window.state().with_host(|desk| desk.act(action));
+        self.window.run_steps(2);
+    }
+
+    /// Presses the button of this name.
+    fn press(&mut self, name: &str) {
+        self.window.get_by_label(name).click_accesskit();
+        self.window.run_steps(3);
+    }
+
+    fn shows(&self, text: &str) -> bool {
+        self.window.query_all_by_label_contains(text).next().is_some()
+    }
+
+    /// Waits until a text is shown.
+    fn waits_for(&mut self, text: &str) {
+        for _ in 0..1200 {
+            self.window.step();
+            if self.shows(text) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        panic!("{text} does not come");
+    }
+
+    /// Looks at the page in every size.
+    fn look(&mut self, name: &str) {
+        for ([width, height], scale) in SIZES {
+            self.window.set_pixels_per_point(scale);
+            self.window.set_size([width / scale, height / scale].into());
+            self.window.run_steps(4);
+            let shown = format!("{}-{name}-{width}x{height}-{scale}", self.program.name());
+            self.reaches_all(&shown, [width / scale, height / scale]);
+            self.keep(&shown);
+        }
+        self.window.set_pixels_per_point(1.0);
+        self.window.set_size([1280.0, 800.0].into());
+        self.window.run_steps(3);
+    }
+
+    /// Notes what is cut off beside the window.
+    fn reaches_all(&mut self, shown: &str, [width, _]: [f32; 2]) {
+        let all = self.window.query_all(By::new().predicate(|node| node.raw_bounds().is_some()));
+        let cut = all.filter(|node| node.rect().left() < -1.0 || node.rect().right() > width + 1.0);
+        let cut: Vec<_> = cut.map(|node| format!("{shown}: {:?} at {:?}", node.accesskit_node().label(), node.rect())).collect();
+        self.cut.extend(cut);
+    }
+
+    /// Keeps a picture if pictures are wanted.
+    fn keep(&mut self, name: &str) {
+        let Some(folder) = std::env::var_os("TREPAN_GALLERY").map(PathBuf::from) else { return };
+        let drawn = self.window.render().unwrap();
+        let (width, height) = (drawn.width(), drawn.height());
+        fs::create_dir_all(&folder).unwrap();
+        let image = Image { width, height, rgba: drawn.into_raw() };
+        image.write_png(&folder.join(format!("{name}.png"))).unwrap();
+    }
+
+    /// Puts sessions of one person into the folder of sessions.
+    fn keeps_sessions(&self) -> PathBuf {
+        let mut last = PathBuf::new();
+        for day in 1..=7 {
+            last = self.home.join(format!("sessions/{}/2026-03-0{day}T10-20-30", self.program.name()));
+            fs::create_dir_all(&last).unwrap();
+            let lesson = (day % 2 == 1).then_some("first-operation");
+            let summary = json!({
+                "app": self.program.name(), "case": "case-head", "device": "mouse", "person": "Ada", "lesson": lesson,
+                "bone_removed_mm3": 60.0 + 10.0 * f64::from(day),
+                "plan": { "outside_plan_mm3": 20.0 / f64::from(day), "dice": 0.5 + 0.05 * f64::from(day) },
+                "scores": { "plunge_mm": 3.0 - 0.4 * f64::from(day), "burr_touches_of_brain": 7 - day,
+                            "times_through": 1, "drilling_s": 200.0 / f64::from(day), "path_mm": 900.0 },
+            });
+            fs::write(last.join("summary.json"), summary.to_string()).unwrap();
+        }
+        last
+    }
+
+    /// Walks through all pages around a session.
+    fn walk(&mut self, look: &mut dyn FnMut(&mut Self, &str)) {
+        look(self, "start");
+        let images = |ct: Option<&str>| Source::Images { ct: ct.map(PathBuf::from), mri: None, register: false };
+        let case = |name: &str, source| Recent { name: name.into(), source, ..Recent::default() };
+        self.window.state().with_host(|desk| {
+            let form = &mut desk.form;
+            form.settings.recent =
+                vec![case("frontal tumour", images(Some("/ct"))), case("case-head", Source::BuiltIn)];
+            form.settings.person = "Ada".into();
+            form.case = Recent { opening: Some([30.0, 40.0, 20.0]), ..case("frontal tumour", images(Some("/ct"))) };
+        });
+        self.window.run_steps(2);
+        look(self, "start-chosen");
+        self.act(Action::Browse(Goal::Ct));
+        self.act(Action::Into(Path::new(env!("CARGO_MANIFEST_DIR")).into()));
+        look(self, "browse");
+        self.window.state().with_host(|desk| desk.dropped("/images".into()));
+        look(self, "dropped");
+        self.act(Action::Sessions);
+        look(self, "no-sessions");
+        let last = self.keeps_sessions();
+        self.act(Action::Sessions);
+        look(self, "sessions");
+        self.act(Action::Result(last.clone()));
+        look(self, "result");
+        self.act(Action::Result(last.with_file_name("2026-03-06T10-20-30")));
+        look(self, "result-without-lesson");
+        self.act(Action::Lessons);
+        look(self, "lessons");
+        self.act(Action::Home);
+        self.act(Action::Begin);
+        self.waits_for("start page");
+        look(self, "fault");
+        self.act(Action::Home);
+        self.act(Action::BuiltIn);
+    }
+}
+
+#[test]
+fn every_page_can_be_used_at_every_size() {
+    for program in [Program::Craniotomy, Program::Brain, Program::Integrated] {
+        let home = tempfile::tempdir().unwrap();
+        let mut gallery = Gallery::open(program, home.path());
+        gallery.walk(&mut |gallery, name| gallery.look(name));
+        gallery.act(Action::Check);
+        gallery.look("loading-check");
+        gallery.waits_for("Slices");
+        gallery.look("check");
+        gallery.act(Action::Home);
+        gallery.act(Action::Begin);
+        gallery.look("loading");
+        gallery.waits_for("Quit (Q)");
+        gallery.window.run_steps(10);
+        gallery.look("session");
+        gallery.press("Keys (F1)");
+        gallery.look("help");
+        gallery.press("Keys (F1)");
+        gallery.press("Large type (L)");
+        gallery.look("large");
+        gallery.press("Large type (L)");
+        gallery.press("Light or dark (I)");
+        gallery.look("light");
+        gallery.press("Light or dark (I)");
+        gallery.press("Quit (Q)");
+        gallery.waits_for("start page");
+        gallery.look("result-of-session");
+        assert!(gallery.cut.is_empty(), "{:#?}", gallery.cut);
+    }
+}
