@@ -90,7 +90,7 @@ pub(crate) fn unused_key(input: &egui::InputState, panel: &Panel) -> Option<Stri
             (Key::Space, _) => panel.no_drill.clone(),
             (Key::OpenBracket | Key::CloseBracket, _) => (!replays).then(|| "events are in a replay only".into()),
             _ => number(key, panel).unwrap_or_else(|| {
-                Some(format!("the key {} has no use here: F1 shows all keys", key.symbol_or_name()))
+                Some(format!("this key has no use here: {}; F1 shows all keys", key.symbol_or_name()))
             }),
         }
     };

@@ -214,7 +214,7 @@ impl<H: Host> Pages<H> {
             Shown::Session(strip) => {
                 let strip = strip.map(|page| {
                     let panel = egui::Panel::top("strip").resizable(false).max_size(260.0);
-                    panel.show(ui, |ui| page::show(ui, &page, &mut self.textures)).inner
+                    panel.show(ui, |ui| page::strip(ui, &page, &mut self.textures)).inner
                 });
                 *ui.visuals_mut() = theme;
                 if let Some(mut shown) = guest.take() {

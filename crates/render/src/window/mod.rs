@@ -52,6 +52,8 @@ mod panel_text;
 mod plot;
 mod pointer;
 mod quality;
+#[cfg(test)]
+mod spoken;
 mod surface;
 #[cfg(any(feature = "sound", test))]
 mod synthesis;
@@ -68,7 +70,7 @@ pub use input::WindowInput;
 pub use page::{Amount, Button, Choosable, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};
-pub use words::{Language, missing, speak};
+pub use words::{Language, missing, speak, tr};
 
 use crate::{Camera, Frame, Image, Renderer};
 use std::any::Any;

@@ -54,15 +54,16 @@ pub(crate) fn show(
         ui.add_space(8.0);
         ui.label(RichText::new(tr(&panel.phase)).size(22.0).strong());
         ui.label(RichText::new(format!("{} {}", tr("case"), panel.case)).weak());
-        ui.label(RichText::new(tr(&panel.hint)).size(14.0));
+        ui.label(RichText::new(tr(&panel.hint)).size(15.0).strong());
         ui.separator();
         force(ui, panel, traces);
         grid(ui, "task", &panel.task, 16.0);
         ui.separator();
-        buttons(ui, panel, look, &mut clicks);
+        pedal(ui, panel, &mut clicks);
         for (at, choice) in panel.choices.iter().enumerate() {
             clicks.chosen = options(ui, choice).map(|option| [at, option]).or(clicks.chosen);
         }
+        buttons(ui, panel, look, &mut clicks);
         if panel.by_hand {
             by_mouse(ui, &mut hand.guide);
         }
@@ -104,10 +105,10 @@ fn heading(ui: &mut egui::Ui, text: String) {
 
 fn force(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
     heading(ui, tr(&format!("Force  {:.2} N", panel.force_n)));
-    traces.force.show(ui, Drawn { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
+    traces.force.show(ui, Drawn { name: "force", height: 72.0, mark: panel.force_limit_n.into(), colour: SKY });
     let most = traces.force.most();
     let note = format!("last {SECONDS_SHOWN:.0} s, most {most:.2} N, limit {:.1} N", panel.force_limit_n);
-    ui.label(RichText::new(tr(&note)).small()).on_hover_text(tr("what your hand would feel on a device with force"));
+    ui.label(RichText::new(tr(&note)).size(12.0)).on_hover_text(tr("what your hand would feel on a device with force"));
 }
 
 fn rate(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
@@ -128,48 +129,59 @@ fn grid(ui: &mut egui::Ui, id: &str, values: &[(String, String)], size: f32) {
     }
 }
 
+fn wide(ui: &egui::Ui, text: RichText, height: f32) -> egui::Button<'static> {
+    egui::Button::new(text).wrap().min_size(egui::vec2(ui.available_width(), height))
+}
+
+/// The button that is held down to drill.
+fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
+    if !panel.by_hand {
+        return;
+    }
+    let name = RichText::new(tr(if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" })).strong();
+    let pedal = match panel.drilling {
+        true => wide(ui, name.color(Color32::BLACK), 32.0).fill(ORANGE),
+        false => wide(ui, name, 32.0),
+    };
+    // A widget that only senses clicks counts as released after 0.8 s.
+    let held = ui.add_enabled(panel.no_drill.is_none(), pedal.sense(egui::Sense::drag()));
+    clicks.pedal = held.is_pointer_button_down_on();
+    if let Some(why) = &panel.no_drill {
+        held.on_disabled_hover_text(tr(why));
+    }
+}
+
+/// The commands to hand and view, and the session's own actions.
 fn buttons(ui: &mut egui::Ui, panel: &Panel, look: &Look, clicks: &mut Clicks) {
-    let width = ui.available_width();
-    let wide = |text: RichText, height: f32| egui::Button::new(text).wrap().min_size(egui::vec2(width, height));
-    if panel.by_hand {
-        let name = tr(if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" });
-        let mut pedal = wide(RichText::new(&name).strong(), 32.0);
-        if panel.drilling {
-            pedal = wide(RichText::new(&name).strong().color(Color32::BLACK), 32.0).fill(ORANGE);
-        }
-        // A widget that only senses clicks counts as released after 0.8 s.
-        let held = ui.add_enabled(panel.no_drill.is_none(), pedal.sense(egui::Sense::drag()));
-        clicks.pedal = held.is_pointer_button_down_on();
-        if let Some(why) = &panel.no_drill {
-            held.on_disabled_hover_text(tr(&why));
-        }
-    }
-    let next = format!("{}: {}", label(Command::NextTool), tr(&panel.tool));
-    let of_hand = [Command::NextTool, Command::Undo, Command::Redo, Command::Withdraw];
-    let of_view = [Command::Reset, Command::FocusTool];
-    for command in of_hand.into_iter().filter(|_| panel.by_hand).chain(of_view) {
-        let name = if command == Command::NextTool { next.clone() } else { label(command) };
-        let why_not = refusal(command, panel, look);
-        let mut button = ui.add_enabled(why_not.is_none(), wide(RichText::new(name), 26.0));
-        if let Some(why) = why_not {
-            button = button.on_disabled_hover_text(tr(&why));
-        }
-        if button.clicked() {
-            clicks.commands.push(command);
-        }
-    }
     for (at, action) in panel.actions.iter().enumerate() {
         let key = action.key.map_or_else(String::new, |key| format!(" ({})", key.to_uppercase()));
         let name = RichText::new(format!("{}{key}", tr(&action.name)));
-        let button = if action.on { wide(name.color(Color32::BLACK), 26.0).fill(SKY) } else { wide(name, 26.0) };
+        let button = match action.on {
+            true => wide(ui, name.color(Color32::BLACK), 26.0).fill(SKY),
+            false => wide(ui, name, 26.0),
+        };
         let mut button = ui.add_enabled(action.why_not.is_none(), button);
         if let Some(why) = &action.why_not {
-            button = button.on_disabled_hover_text(tr(&why));
+            button = button.on_disabled_hover_text(tr(why));
         }
         if button.clicked() {
             clicks.actions |= 1 << at;
         }
     }
+    let of_hand = [Command::Undo, Command::Redo, Command::Withdraw, Command::NextTool];
+    let of_view = [Command::Reset, Command::FocusTool];
+    ui.horizontal_wrapped(|ui| {
+        for command in of_hand.into_iter().filter(|_| panel.by_hand).chain(of_view) {
+            let why_not = refusal(command, panel, look);
+            let mut button = ui.add_enabled(why_not.is_none(), egui::Button::new(label(command)));
+            if let Some(why) = why_not {
+                button = button.on_disabled_hover_text(tr(&why));
+            }
+            if button.clicked() {
+                clicks.commands.push(command);
+            }
+        }
+    });
 }
 
 /// What the left button does.

@@ -15,7 +15,7 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// A session that returns a given panel and stores its inputs.
 #[derive(Default)]
-struct TestSession {
+pub(super) struct TestSession {
     panel: Panel,
     inputs: Vec<WindowInput>,
     captures: Vec<(Capture, [u32; 2])>,
@@ -37,7 +37,7 @@ impl Session for TestSession {
 }
 
 /// The parameters of a requested picture.
-struct Requested {
+pub(super) struct Requested {
     bone: bool,
     brain: bool,
     slices: SliceLook,
@@ -45,7 +45,7 @@ struct Requested {
 }
 
 /// Draws by the processor and stores the requested parameters.
-struct TestPainter(Painter, Option<Requested>);
+pub(super) struct TestPainter(Painter, Option<Requested>);
 
 impl Draws for TestPainter {
     fn device(&self) -> Option<&Gpu> {
@@ -67,13 +67,13 @@ impl Draws for TestPainter {
     }
 }
 
-struct Bench {
-    window: Harness<'static, Window<TestSession, TestPainter>>,
+pub(super) struct Bench {
+    pub window: Harness<'static, Window<TestSession, TestPainter>>,
     lent: Lent<TestSession, TestPainter>,
 }
 
 impl Bench {
-    fn with(panel: Panel) -> Self {
+    pub fn with(panel: Panel) -> Self {
         let bone = VoxelVolume::isotropic([12; 3], Vec3::splat(-5.5), 1.0, 900i16);
         let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
         let data = SceneData { bone, brain: None, mri: None, tint: None };
@@ -97,7 +97,7 @@ impl Bench {
     }
 
     /// Presses a key; returns the session's next input.
-    fn press(&mut self, key: Key) -> WindowInput {
+    pub fn press(&mut self, key: Key) -> WindowInput {
         self.window.key_down(key);
         self.window.step();
         let input = self.last_input();
@@ -199,7 +199,7 @@ fn keys_and_buttons_give_the_same_input_once() {
     bench.window.step();
     assert!(!bench.last_input().undo);
     bench.set_panel(|panel| panel.tool = "probe".into());
-    assert!(bench.click("Next tool (N): probe").next_tool);
+    assert!(bench.click("Next tool (N)").next_tool);
 }
 
 #[test]
@@ -348,7 +348,8 @@ fn pictures_of_the_window_reach_the_session() {
     bench.press(Key::P);
     assert_eq!(take_pictures(&mut bench), 1);
     let captures = |bench: &Bench| bench.lent.borrow().as_ref().unwrap().session.captures.clone();
-    assert_eq!(captures(&bench), [(Capture::Picture, [4, 3])]);
+    let kinds: Vec<Capture> = captures(&bench).into_iter().map(|(what, _)| what).collect();
+    assert_eq!(kinds, [Capture::Picture]);
     bench.press(Key::V);
     assert!(bench.shows("every picture of the window is saved"));
     let taken: usize = (0..5).map(|_| take_pictures(&mut bench)).sum();

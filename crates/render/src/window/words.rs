@@ -3,7 +3,8 @@
 //! # Practice
 //! The English text is the key, looked up where the window puts it on screen. A number in a text
 //! stands as `{}` in key and translation: "{} mm apart". A text without a line of its own is taken
-//! apart at "; ", ": " and ", ". What is missing stays English and is kept for translators.
+//! apart at "; ", ": " and ", ". What is missing stays English and is kept for translators. One letter, as in a unit or a key, is
+//! no word.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
@@ -33,7 +34,7 @@ pub fn missing() -> Vec<String> {
 }
 
 /// Translates a text into the language of the window.
-pub(crate) fn tr(text: &str) -> String {
+pub fn tr(text: &str) -> String {
     SPOKEN.with_borrow_mut(|spoken| match spoken {
         Some((language, missing)) => language.translate(text, missing),
         None => text.into(),
@@ -45,7 +46,8 @@ const JOINTS: [&str; 4] = ["\n", "; ", ": ", ", "];
 
 impl Language {
     fn translate(&self, text: &str, missing: &mut BTreeSet<String>) -> String {
-        if !text.contains(char::is_alphabetic) {
+        let is_word = |pair: [char; 2]| pair.iter().all(|letter| letter.is_alphabetic());
+        if !text.chars().zip(text.chars().skip(1)).any(|(a, b)| is_word([a, b])) {
             return text.into();
         }
         if let Some(found) = self.texts.get(text) {

@@ -1,5 +1,6 @@
 //! Texts of the window's panel, live and in a replay: phase, tool, forces, warnings.
 
+use crate::printable::capital;
 use crate::program::{Phase, Program, called};
 use crate::run::View;
 use crate::stages::notice::{Notice, Warning};
@@ -49,7 +50,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let second = view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length())));
     Panel {
         case: case.into(),
-        phase: sample.phase().name().into(),
+        phase: ["Craniotomy", "Brain"][sample.phase() as usize].into(),
         tool: called(&sample.tool),
         drilling: sample.drilling,
         sound: Sound {
@@ -104,8 +105,7 @@ fn technical(bits: u32) -> impl Iterator<Item = Warning> {
 }
 
 fn in_words(notice: Notice) -> String {
-    let (kind, text) = notice.words();
-    format!("{kind}: {text}")
+    capital(notice.words().1)
 }
 
 /// Returns a hint on what to do next.
