@@ -1,5 +1,6 @@
 //! Every page of the three programs at every size: no control is out of reach. With
-//! `TREPAN_GALLERY` as the name of a folder the pages are kept there as pictures.
+//! `TREPAN_GALLERY` as the name of a folder the pages, and those of a session, are kept there as
+//! pictures, in the language `TREPAN_GALLERY_LANGUAGE`.
 
 use super::*;
 use crate::desk::action::Action;
@@ -50,7 +51,8 @@ impl Gallery {
         let tissues = TissueSource::regions_of_aseg(case.aseg);
         let (ct, mri, labels) = (Some(case.ct), Some(case.mri), Some(case.labels));
         let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues };
-        let options = Options::try_parse_from(["x", "--quality", "draft"]).unwrap();
+        let language = std::env::var("TREPAN_GALLERY_LANGUAGE").unwrap_or("en".into());
+        let options = Options::try_parse_from(["x", "--quality", "draft", "--language", &language]).unwrap();
         let (stage, offers) = window::stage();
         let desk = Desk::new(program, options, built_in, (stage, Err(GpuError::NoAdapter)), Stop::default());
         let pages = Pages::undisplayed(offers, desk);
@@ -68,9 +70,9 @@ impl Gallery {
         self.window.run_steps(2);
     }
 
-    /// Presses the button of this name.
-    fn press(&mut self, name: &str) {
-        self.window.get_by_label(name).click_accesskit();
+    /// Presses the button of a command with its key.
+    fn press(&mut self, name: &str, key: &str) {
+        self.window.get_by_label(&format!("{} ({key})", tr(name))).click_accesskit();
         self.window.run_steps(3);
     }
 
@@ -78,11 +80,11 @@ impl Gallery {
         self.window.query_all_by_label_contains(text).next().is_some()
     }
 
-    /// Waits until a text is shown.
+    /// Waits until a text is shown, in the language of the window.
     fn waits_for(&mut self, text: &str) {
         for _ in 0..1200 {
             self.window.step();
-            if self.shows(text) {
+            if self.shows(&tr(text)) {
                 return;
             }
             std::thread::sleep(Duration::from_millis(100));
@@ -192,20 +194,20 @@ impl Gallery {
         self.act(Action::Home);
         self.act(Action::Begin);
         self.look("loading");
-        self.waits_for("Quit (Q)");
+        self.waits_for("Engineering");
         self.window.run_steps(10);
         self.look("session");
-        self.press("Keys (F1)");
+        self.press("Keys", "F1");
         self.look("help");
-        self.press("Keys (F1)");
-        self.press("Large type (L)");
+        self.press("Keys", "F1");
+        self.press("Large type", "L");
         self.look("large");
-        self.press("Large type (L)");
-        self.press("Light or dark (I)");
+        self.press("Large type", "L");
+        self.press("Light or dark", "I");
         self.look("light");
-        self.press("Light or dark (I)");
-        self.press("Quit (Q)");
-        self.waits_for("start page");
+        self.press("Light or dark", "I");
+        self.press("Quit", "Q");
+        self.waits_for("Back to the start page");
         self.look("result-of-session");
     }
 }
@@ -283,7 +285,7 @@ fn every_text_has_a_german_line() {
         });
         if program == Program::Integrated {
             gallery.act(Action::Check);
-            gallery.waits_for("Schichten");
+            gallery.waits_for("Slices");
             gallery.window.run_steps(2);
         }
         panel_texts().iter().for_each(|text| _ = tr(text));
