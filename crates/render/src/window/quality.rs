@@ -6,6 +6,7 @@
 //! every pixel is drawn, then its edges are smoothed sample by sample, then nothing until something
 //! moves again.
 
+use super::Pace;
 use crate::{Camera, Cut, Frame, SliceLook, Stereo};
 use glam::Vec3;
 use trepan_geometry::{Pose, Tool};
@@ -76,6 +77,8 @@ pub(crate) struct Quality {
     paced: bool,
     /// Mean time between pictures while something moves, s.
     interval_s: f64,
+    /// The last picture, if something moved in it and in the one before.
+    pub pace: Option<Pace>,
 }
 
 impl Quality {
@@ -116,10 +119,12 @@ impl Quality {
     pub fn note(&mut self, drawing_s: f64, now: f64) {
         let interval = now - std::mem::replace(&mut self.last, now);
         let moves = self.rest == Rest::Moving;
+        self.pace = None;
         // A sharp picture before says nothing of the pace.
         if !std::mem::replace(&mut self.paced, moves) || !moves || self.moved_at != now {
             return;
         }
+        self.pace = Some(Pace { interval_s: interval, detail: self.detail() });
         self.interval_s += (interval - self.interval_s) * if self.interval_s == 0.0 { 1.0 } else { 0.15 };
         // Where drawing is short, others keep the window waiting: fewer pixels would not help.
         self.slow = if interval > SLOW_S && drawing_s > FAST_S { self.slow + 1 } else { 0 };
