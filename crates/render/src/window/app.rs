@@ -9,7 +9,7 @@ use super::look::Look;
 use super::panel::{self, Clicks, Traces};
 use super::pointer::Pointer;
 use super::quality::{Quality, Step};
-use super::screen::Screen;
+use super::screen::{Area, Screen};
 use super::surface::{Ray, Surfaces};
 use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, timeline};
 use crate::View;
@@ -211,8 +211,9 @@ impl<S: Session, D: Draws> Window<S, D> {
         let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
         let frame = self.look.on(shared.session.frame(self.hand.camera));
+        let parts = Area::of(pixels, self.look.apart && frame.slices.shown);
         let stale = shared.renderer.is_stale();
-        let (step, began) = (self.quality.step(&frame, pixels, stale, now), Instant::now());
+        let (step, began) = (self.quality.step(&frame, parts.size, stale, now), Instant::now());
         let shown = match (step, self.last) {
             (Step::Keep, Some(last)) => Ok(last),
             (Step::Refine, Some(last)) => {
@@ -221,15 +222,16 @@ impl<S: Session, D: Draws> Window<S, D> {
                 }
                 Ok(last)
             }
-            (Step::Draw(detail), _) => self.screen.draw(ui, state, &mut shared.renderer, &frame, pixels, detail),
-            _ => self.screen.draw(ui, state, &mut shared.renderer, &frame, pixels, 1.0),
+            (Step::Draw(detail), _) => self.screen.draw(ui, state, &mut shared.renderer, &frame, &parts, detail),
+            _ => self.screen.draw(ui, state, &mut shared.renderer, &frame, &parts, 1.0),
         };
         self.quality.note(began.elapsed().as_secs_f64(), now);
         match shown {
             Err(error) => shared.fault = Some(error.to_string()),
             Ok(view) => {
                 self.last = Some(view);
-                self.screen.paint(ui, area);
+                self.screen.paint(ui, area, 0);
+                parts.slices_aspect().into_iter().for_each(|aspect| self.slices(ui, aspect));
                 self.lead(ui, &response, &view, &shared.session);
                 let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
                 let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
@@ -237,6 +239,20 @@ impl<S: Session, D: Draws> Window<S, D> {
                 shared.shown = true;
             }
         }
+    }
+
+    /// Shows the slices in a window of their own, for another screen.
+    fn slices(&mut self, ui: &egui::Ui, aspect: f32) {
+        let id = egui::ViewportId::from_hash_of("slices");
+        let window = egui::ViewportBuilder::default().with_title("Slices").with_inner_size([900.0 * aspect, 900.0]);
+        let (screen, apart) = (&self.screen, &mut self.look.apart);
+        ui.ctx().show_viewport_immediate(id, window, |ui, _| {
+            let space = ui.max_rect();
+            let size =
+                egui::vec2(space.width().min(space.height() * aspect), space.height().min(space.width() / aspect));
+            screen.paint(ui, egui::Rect::from_center_size(space.center(), size), 1);
+            *apart &= !ui.input(|input| input.viewport().close_requested());
+        });
     }
 
     /// Moves view and tool by pointer and keys, and draws where the tool will land.

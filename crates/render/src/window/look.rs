@@ -17,6 +17,8 @@ pub(crate) struct Look {
     pub slices: SliceLook,
     /// Whether the slices show the whole head instead of the tool's surroundings.
     pub whole: bool,
+    /// Whether the slices have a window of their own.
+    pub apart: bool,
     /// The inactive camera: the microscope's or the orbiting one.
     other: Option<Camera>,
     microscope: bool,
@@ -78,6 +80,7 @@ impl Look {
             stereo: None,
             slices: SliceLook::default(),
             whole: false,
+            apart: false,
             other: microscope,
             microscope: false,
         }
@@ -107,6 +110,7 @@ impl Look {
             Command::Bone => self.bone ^= true,
             Command::Brain => self.brain ^= true,
             Command::Slices => self.slices.shown ^= true,
+            Command::Apart => self.apart ^= true,
             Command::Hints => self.hints ^= true,
             Command::Section => self.section = if self.section.is_some() { None } else { Some(Section::FIRST) },
             Command::Stereo => {
@@ -166,6 +170,7 @@ impl Look {
             ui.checkbox(&mut self.bone, label(Command::Bone));
             ui.checkbox(&mut self.brain, label(Command::Brain));
             ui.checkbox(&mut self.slices.shown, label(Command::Slices));
+            ui.add_enabled(self.slices.shown, egui::Checkbox::new(&mut self.apart, label(Command::Apart)));
             ui.checkbox(&mut self.hints, label(Command::Hints));
         });
         let mut microscope = self.microscope;

@@ -5,12 +5,42 @@
 //! pixel. A copied picture, as the processor draws it, is therefore shown by a pass of its own.
 
 use super::{Draws, Refined};
+use crate::layout::Layout;
 use crate::{Frame, Image, RenderError, View};
 use eframe::egui_wgpu::{self, RenderState};
 use eframe::{egui, wgpu};
 
+/// The picture in the window, whole or in parts.
+pub(super) struct Screen {
+    way: Way,
+    area: Area,
+}
+
+/// A picture's size and its parts, `[x, y, width, height]`, pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Area {
+    pub size: [u32; 2],
+    parts: Vec<[u32; 4]>,
+}
+
+impl Area {
+    /// A picture in one part, or the 3-D view of so many pixels and the slices apart from it.
+    pub fn of(view: [u32; 2], apart: bool) -> Self {
+        let size @ [width, height] = if apart { Layout::around(view) } else { view };
+        let whole = [0, 0, width, height];
+        let layout = Layout::of(width, height, apart);
+        let parts = layout.column().map_or_else(|| vec![whole], |column| vec![layout.view, column]);
+        Self { size, parts }
+    }
+
+    /// Width over height of the slices, if they are apart.
+    pub fn slices_aspect(&self) -> Option<f32> {
+        self.parts.get(1).map(|[_, _, width, height]| *width as f32 / *height as f32)
+    }
+}
+
 /// How the picture gets into the window.
-pub(super) enum Screen {
+enum Way {
     /// The renderer's own texture is shown.
     Shares(Option<(egui::TextureId, wgpu::TextureView)>),
     /// Every picture is copied into a texture of the window.
@@ -18,7 +48,7 @@ pub(super) enum Screen {
 }
 
 /// The window's copy of the picture.
-pub(super) enum Copied {
+enum Copied {
     /// Shown by a pass of its own.
     Plain(Plain),
     /// Shown by egui, in a window without wgpu.
@@ -39,7 +69,8 @@ pub(super) enum ShowError {
 impl Screen {
     /// Shares the renderer's texture, or copies its pictures.
     pub fn new(copies: bool) -> Self {
-        if copies { Self::Copies(None) } else { Self::Shares(None) }
+        let way = if copies { Way::Copies(None) } else { Way::Shares(None) };
+        Self { way, area: Area::of([1, 1], false) }
     }
 
     /// Draws a frame for an area of the window.
@@ -49,56 +80,60 @@ impl Screen {
         state: Option<&RenderState>,
         renderer: &mut impl Draws,
         frame: &Frame<'_>,
-        pixels: [u32; 2],
+        area: &Area,
         detail: f32,
     ) -> Result<View, ShowError> {
-        let texture = match self {
-            Self::Shares(texture) => texture,
-            Self::Copies(copied) => {
-                let (view, image) = renderer.picture(frame, pixels, detail)?;
-                copied.get_or_insert_with(|| Copied::new(ui, state)).set(state, &image);
+        self.area.clone_from(area);
+        let texture = match &mut self.way {
+            Way::Shares(texture) => texture,
+            Way::Copies(copied) => {
+                let (view, image) = renderer.picture(frame, area.size, detail)?;
+                copied.get_or_insert_with(|| Copied::new(ui, state)).set(state, &image, area);
                 return Ok(view);
             }
         };
         let state = state.ok_or(ShowError::NoDevice)?;
-        let view = renderer.draw(frame, pixels, detail)?;
+        let view = renderer.draw(frame, area.size, detail)?;
         if let Some(drawn) = renderer.texture() {
             register(texture, state, drawn.view());
             return Ok(view);
         }
         // The processor has taken over: its pictures are copied from now on.
-        *self = Self::Copies(None);
-        self.draw(ui, Some(state), renderer, frame, pixels, detail)
+        self.way = Way::Copies(None);
+        self.draw(ui, Some(state), renderer, frame, area, detail)
     }
 
     /// Smooths the edges of the last picture by one more sample; returns whether there was one to
     /// add.
     pub fn refine(&mut self, state: Option<&RenderState>, renderer: &mut impl Draws, frame: &Frame<'_>) -> bool {
         // A lost device is met by the next picture.
-        match (renderer.refine(frame, matches!(self, Self::Copies(_))), self) {
-            (Ok(Refined::Copied(image)), Self::Copies(Some(copied))) => {
-                copied.set(state, &image);
+        match (renderer.refine(frame, matches!(self.way, Way::Copies(_))), &mut self.way) {
+            (Ok(Refined::Copied(image)), Way::Copies(Some(copied))) => {
+                copied.set(state, &image, &self.area);
                 true
             }
             (refined, _) => matches!(refined, Ok(Refined::Drawn)),
         }
     }
 
-    /// Shows the last picture in an area of the window.
-    pub fn paint(&self, ui: &egui::Ui, area: egui::Rect) {
-        let id = match self {
-            Self::Copies(Some(Copied::Plain(plain))) => {
-                let Some(group) = plain.shown.as_ref().map(|(_, group)| group.clone()) else { return };
-                let pass = Pass { pipeline: plain.pipeline.clone(), group };
-                ui.painter().add(egui_wgpu::Callback::new_paint_callback(area, pass));
+    /// Shows a part of the last picture in an area of a window.
+    pub fn paint(&self, ui: &egui::Ui, to: egui::Rect, part: usize) {
+        let Some(&[x, y, width, height]) = self.area.parts.get(part) else { return };
+        let id = match &self.way {
+            Way::Copies(Some(Copied::Plain(plain))) => {
+                let Some((_, group)) = plain.parts.get(part) else { return };
+                let pass = Pass { pipeline: plain.pipeline.clone(), group: group.clone() };
+                ui.painter().add(egui_wgpu::Callback::new_paint_callback(to, pass));
                 return;
             }
-            Self::Copies(Some(Copied::Egui(texture))) => texture.id(),
-            Self::Shares(Some((id, _))) => *id,
-            Self::Copies(None) | Self::Shares(None) => return,
+            Way::Copies(Some(Copied::Egui(texture))) => texture.id(),
+            Way::Shares(Some((id, _))) => *id,
+            Way::Copies(None) | Way::Shares(None) => return,
         };
-        let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-        ui.painter().image(id, area, whole, egui::Color32::WHITE);
+        let share =
+            |x: u32, y: u32| egui::pos2(x as f32 / self.area.size[0] as f32, y as f32 / self.area.size[1] as f32);
+        let part = egui::Rect::from_min_max(share(x, y), share(x + width, y + height));
+        ui.painter().image(id, to, part, egui::Color32::WHITE);
     }
 }
 
@@ -108,9 +143,9 @@ impl Copied {
         state.map_or_else(|| Self::Egui(handle()), |state| Self::Plain(Plain::new(state)))
     }
 
-    fn set(&mut self, state: Option<&RenderState>, image: &Image) {
+    fn set(&mut self, state: Option<&RenderState>, image: &Image, area: &Area) {
         match (self, state) {
-            (Self::Plain(plain), Some(state)) => plain.set(state, image),
+            (Self::Plain(plain), Some(state)) => plain.set(state, image, area),
             (Self::Plain(_), None) => (),
             (Self::Egui(texture), _) => {
                 let size = [image.width, image.height].map(|n| n as usize);
@@ -134,11 +169,11 @@ fn register(texture: &mut Option<(egui::TextureId, wgpu::TextureView)>, state: &
     *texture = Some((id, view.clone()));
 }
 
-/// A texture of the picture's pixels, and the pass that shows it.
-pub(super) struct Plain {
+/// Textures of the picture's parts, and the pass that shows them.
+struct Plain {
     pipeline: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
-    shown: Option<(wgpu::Texture, wgpu::BindGroup)>,
+    parts: Vec<(wgpu::Texture, wgpu::BindGroup)>,
 }
 
 impl Plain {
@@ -172,18 +207,24 @@ impl Plain {
         // What a target turns into sRGB must be read from sRGB.
         let format =
             if target.is_srgb() { wgpu::TextureFormat::Rgba8UnormSrgb } else { wgpu::TextureFormat::Rgba8Unorm };
-        Self { pipeline, format, shown: None }
+        Self { pipeline, format, parts: Vec::new() }
     }
 
-    fn set(&mut self, state: &RenderState, image: &Image) {
-        let size = wgpu::Extent3d { width: image.width, height: image.height, depth_or_array_layers: 1 };
-        if self.shown.as_ref().is_none_or(|(texture, _)| texture.size() != size) {
-            self.shown = Some(self.sized(state, size));
+    fn set(&mut self, state: &RenderState, image: &Image, area: &Area) {
+        self.parts.truncate(area.parts.len());
+        for (n, &[x, y, width, height]) in area.parts.iter().enumerate() {
+            let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+            if self.parts.get(n).is_none_or(|(texture, _)| texture.size() != size) {
+                self.parts.truncate(n);
+                self.parts.push(self.sized(state, size));
+            }
+            let layout = wgpu::TexelCopyBufferLayout {
+                offset: 4 * (u64::from(x) + u64::from(image.width) * u64::from(y)),
+                bytes_per_row: Some(4 * image.width),
+                rows_per_image: None,
+            };
+            state.queue.write_texture(self.parts[n].0.as_image_copy(), &image.rgba, layout, size);
         }
-        let Some((texture, _)) = &self.shown else { return };
-        let layout =
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * image.width), rows_per_image: None };
-        state.queue.write_texture(texture.as_image_copy(), &image.rgba, layout, size);
     }
 
     fn sized(&self, state: &RenderState, size: wgpu::Extent3d) -> (wgpu::Texture, wgpu::BindGroup) {
