@@ -54,6 +54,7 @@ pub(crate) fn refusal(command: Command, panel: &Panel, look: &Look) -> Option<St
         Command::NextTool | Command::Withdraw => led(),
         Command::Undo => led().or_else(|| panel.no_undo.clone()),
         Command::Redo => led().or_else(|| panel.no_redo.clone()),
+        Command::Apart if !look.slices.shown => Some("the slices are switched off".into()),
         Command::Microscope if !look.has_microscope() => Some("this view has no microscope".into()),
         _ => None,
     }
@@ -68,6 +69,7 @@ pub(crate) fn done(command: Command, name: &str, look: &Look, large: bool) -> St
         Command::Bone => on(look.bone),
         Command::Brain => on(look.brain),
         Command::Slices => on(look.slices.shown),
+        Command::Apart => on(look.apart),
         Command::Hints => on(look.hints),
         Command::Section => on(look.section.is_some()),
         Command::Stereo => on(look.stereo.is_some()),

@@ -18,6 +18,8 @@ pub(crate) struct Look {
     pub slices: SliceLook,
     /// Whether the slices show the whole head instead of the tool's surroundings.
     pub whole: bool,
+    /// Whether the slices have a window of their own.
+    pub apart: bool,
     /// The inactive camera: the microscope's or the orbiting one.
     other: Option<Camera>,
     microscope: bool,
@@ -79,6 +81,7 @@ impl Look {
             stereo: None,
             slices: SliceLook::default(),
             whole: false,
+            apart: false,
             other: microscope,
             microscope: false,
         }
@@ -108,6 +111,7 @@ impl Look {
             Command::Bone => self.bone ^= true,
             Command::Brain => self.brain ^= true,
             Command::Slices => self.slices.shown ^= true,
+            Command::Apart => self.apart ^= true,
             Command::Hints => self.hints ^= true,
             Command::Section => self.section = if self.section.is_some() { None } else { Some(Section::FIRST) },
             Command::Stereo => {
@@ -167,6 +171,7 @@ impl Look {
             ui.checkbox(&mut self.bone, label(Command::Bone));
             ui.checkbox(&mut self.brain, label(Command::Brain));
             ui.checkbox(&mut self.slices.shown, label(Command::Slices));
+            ui.add_enabled(self.slices.shown, egui::Checkbox::new(&mut self.apart, label(Command::Apart)));
             ui.checkbox(&mut self.hints, label(Command::Hints));
         });
         let mut microscope = self.microscope;

@@ -52,6 +52,7 @@ mod panel_text;
 mod plot;
 mod pointer;
 mod quality;
+mod screen;
 #[cfg(test)]
 mod spoken;
 mod surface;
@@ -66,7 +67,7 @@ mod words;
 pub use capture::Capture;
 pub use draws::{Draws, Refined};
 pub use host::{Host, Offers, Pages, Shown, Stage, open, stage};
-pub use input::WindowInput;
+pub use input::{Pace, WindowInput};
 pub use page::{Amount, Button, Choosable, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};

@@ -42,6 +42,7 @@ pub(super) struct Requested {
     brain: bool,
     slices: SliceLook,
     camera: Camera,
+    size: [u32; 2],
 }
 
 /// Draws by the processor and stores the requested parameters.
@@ -60,9 +61,9 @@ impl Draws for TestPainter {
         None
     }
 
-    fn picture(&mut self, frame: &Frame, _size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
         let &Frame { show_bone: bone, show_brain: brain, slices, camera, .. } = frame;
-        self.1 = Some(Requested { bone, brain, slices, camera });
+        self.1 = Some(Requested { bone, brain, slices, camera, size });
         Draws::picture(&mut self.0, frame, [160, 120], detail)
     }
 }
@@ -247,6 +248,21 @@ fn hidden_parts_are_not_drawn() {
     bench.window.step();
     let slices = bench.last_request().slices;
     assert_eq!((slices.level_hu, slices.mri_share, slices.shown), (120.0, 0.25, true));
+}
+
+#[test]
+fn slices_get_a_window_of_their_own_and_the_view_the_whole_of_the_first() {
+    let mut bench = Bench::in_hand();
+    let [width, height] = bench.last_request().size;
+    bench.press(Key::W);
+    let apart = bench.last_request().size;
+    assert_eq!(apart, [width + height / 3, height]);
+    bench.press(Key::W);
+    assert_eq!(bench.last_request().size, [width, height]);
+    bench.press(Key::S);
+    bench.press(Key::W);
+    assert_eq!(bench.last_request().size, [width, height], "there are no slices to set apart");
+    assert!(bench.shows("the slices are switched off"));
 }
 
 #[test]

@@ -81,6 +81,7 @@ impl Job {
 
     /// Waits for the end. Keeps how long each stage took.
     pub fn end(self, settings: &mut Settings) -> Result<Done, SessionError> {
+        self.progress.end_wait();
         let (stages, _) = self.progress.so_far();
         for pair in stages.windows(2).filter(|_| self.is_running()) {
             let seconds = (pair[1].1 - pair[0].1) * 1e-3;

@@ -8,7 +8,7 @@ use crate::case::choice::case_to_check;
 use crate::desk::action::Action;
 use crate::desk::browse::{Folder, Goal};
 use crate::desk::check::Check;
-use crate::desk::draft;
+use crate::desk::draft::{self, Looked};
 use crate::desk::form::Form;
 use crate::desk::job::{Done, Job, Work};
 use crate::desk::pages;
@@ -141,13 +141,17 @@ impl Desk {
         };
         let Recent { name, hash, .. } = self.form.case.clone();
         let cache = Cache::of(&options.patient).ok();
-        let again = cache.as_ref().is_some_and(|cache| !hash.is_empty() && cache.find(&hash).is_some());
-        let progress = Progress::default();
-        if let Some(cache) = cache.filter(|_| again && self.program.has_bone()) {
+        let cached = cache.filter(|_| !hash.is_empty()).and_then(|cache| cache.find(&hash));
+        let (again, progress) = (cached.is_some(), Progress::default());
+        if self.program.has_bone() {
             let (stage, device, name) = (self.stage.clone(), self.device.clone(), name.clone());
-            let loading = progress.clone();
+            let (loading, read) = (progress.clone(), progress.awaits_skull());
             std::thread::spawn(move || {
-                let shown = draft::show((&cache, &hash), name, device, (&stage, &loading));
+                let looked = cached.map_or_else(|| Ok(Looked::read(&read)), |folder| Looked::cached(&folder));
+                let shown = looked.and_then(|looked| match looked {
+                    Some(looked) => draft::show(looked, name, device, (&stage, &loading)),
+                    None => Ok(false),
+                });
                 shown.err().into_iter().for_each(|fault| tracing::debug!("no draft of the scene: {fault}"));
             });
         }

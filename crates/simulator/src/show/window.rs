@@ -16,7 +16,7 @@ use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
-use crate::show::picture::{Album, camera, frame, microscope, snap};
+use crate::show::picture::{Album, Moving, camera, frame, microscope, snap};
 use crate::show::raycast::Raycast;
 use crate::stages::notice::Notice;
 use crate::training::Guide;
@@ -210,11 +210,11 @@ pub(crate) fn run<S: window::Session + Send>(
     let start = Start::with(eye, at.sample.state.world_from_tool);
     let detail = opened.table.models.setup.picture.detail as f32;
     let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
-    let counted = Counted { session, pictures: 0, seconds: [0.0; 2] };
+    let counted = Counted { session, pictures: 0, seconds: [0.0; 2], moving: Moving::default() };
     opened.progress.run();
     let closed = opened.stage.run(painter, counted, start);
-    let (mut painter, Counted { session, pictures, seconds: [from, to] }) = (closed.renderer, closed.session);
-    (album.frames, album.seconds) = (album.frames + pictures, to - from);
+    let (mut painter, Counted { session, pictures, seconds: [from, to], moving }) = (closed.renderer, closed.session);
+    (album.frames, album.seconds, album.moving) = (album.frames + pictures, to - from, moving);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
@@ -230,6 +230,7 @@ struct Counted<S> {
     pictures: u64,
     /// Times of the first and the newest picture, s.
     seconds: [f64; 2],
+    moving: Moving,
 }
 
 impl<S: window::Session> window::Session for Counted<S> {
@@ -237,6 +238,7 @@ impl<S: window::Session> window::Session for Counted<S> {
         let first = if self.pictures == 0 { input.seconds } else { self.seconds[0] };
         self.seconds = [first, input.seconds];
         self.pictures += 1;
+        input.pace.iter().for_each(|pace| self.moving.add(pace));
         self.session.update(input)
     }
 
@@ -411,6 +413,7 @@ mod tests {
     use trepan_geometry::ToolState;
     use trepan_haptics::HapticDevice;
     use trepan_link::cell::cell;
+    use trepan_render::window::Pace;
 
     #[test]
     fn a_trainee_reads_the_requests() {
@@ -472,6 +475,7 @@ mod tests {
             playback: None,
             camera: Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0),
             seconds: 0.0,
+            pace: None,
         }
     }
 
@@ -492,12 +496,16 @@ mod tests {
 
     #[test]
     fn pictures_are_counted_with_the_time_from_the_first_to_the_newest() {
-        let mut counted = Counted { session: Blank, pictures: 0, seconds: [0.0; 2] };
+        let mut counted = Counted { session: Blank, pictures: 0, seconds: [0.0; 2], moving: Moving::default() };
         for picture in 0..=20 {
-            let input = WindowInput { seconds: 5.0 + 0.1 * f64::from(picture), ..input() };
+            let pace = (picture % 2 == 1).then_some(Pace { interval_s: 0.05, detail: 0.4 });
+            let input = WindowInput { seconds: 5.0 + 0.1 * f64::from(picture), pace, ..input() };
             window::Session::update(&mut counted, &input);
         }
         assert_eq!((counted.pictures, counted.seconds), (21, [5.0, 7.0]));
+        let moving = counted.moving.summary().expect("ten pictures moved");
+        assert_eq!(moving.frames, 10);
+        assert!((moving.interval_us.p50 - 5e4).abs() < 100.0 && (moving.mean_detail - 0.4).abs() < 1e-6, "{moving:?}");
     }
 
     #[test]
