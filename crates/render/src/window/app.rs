@@ -250,7 +250,9 @@ impl<S: Session, D: Draws> Window<S, D> {
     /// Shows the slices in a window of their own, for another screen.
     fn slices(&mut self, ui: &egui::Ui, aspect: f32) {
         let id = egui::ViewportId::from_hash_of("slices");
-        let window = egui::ViewportBuilder::default().with_title(super::words::tr("Slices")).with_inner_size([900.0 * aspect, 900.0]);
+        let window = egui::ViewportBuilder::default()
+            .with_title(super::words::tr("Slices"))
+            .with_inner_size([900.0 * aspect, 900.0]);
         let (screen, apart) = (&self.screen, &mut self.look.apart);
         ui.ctx().show_viewport_immediate(id, window, |ui, _| {
             let space = ui.max_rect();

@@ -84,6 +84,8 @@ pub struct Button<A> {
     pub main: bool,
     /// Its action; `None` where it cannot be used.
     pub does: Option<A>,
+    /// Whether the label is the name of something, the same in every language.
+    pub is_name: bool,
 }
 
 /// An option of a choice.
@@ -130,17 +132,22 @@ pub struct Picture<A> {
 impl<A> Item<A> {
     /// A button that can be used.
     pub fn button(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
-        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does) })
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does), is_name: false })
+    }
+
+    /// A button with the name of a file or a case, which is shown as it is.
+    pub fn named(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does), is_name: true })
     }
 
     /// The button of the usual next step.
     pub fn main(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
-        Self::Button(Button { name: name.into(), hint: hint.into(), main: true, does: Some(does) })
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: true, does: Some(does), is_name: false })
     }
 
     /// A button that cannot be used now, and why.
     pub fn closed(name: impl Into<String>, why: impl Into<String>) -> Self {
-        Self::Button(Button { name: name.into(), hint: why.into(), main: false, does: None })
+        Self::Button(Button { name: name.into(), hint: why.into(), main: false, does: None, is_name: false })
     }
 }
 
@@ -266,11 +273,11 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
             ui.add_space(8.0);
             ui.label(RichText::new(tr(text)).size(18.0).strong().color(SKY));
         }
-        Item::Text(text) => _ = ui.label(RichText::new(tr(text)).size(15.0).color(INK)),
-        Item::Note(text) => _ = ui.label(RichText::new(tr(text)).color(PALE)),
+        Item::Text(text) => paragraph(ui, RichText::new(tr(text)).size(15.0).color(INK)),
+        Item::Note(text) => paragraph(ui, RichText::new(tr(text)).color(PALE)),
         Item::Verdict(passed, text) => {
             let colour = if *passed { GREEN } else { ORANGE };
-            ui.label(RichText::new(tr(text)).size(18.0).strong().color(colour));
+            paragraph(ui, RichText::new(tr(text)).size(18.0).strong().color(colour));
         }
         Item::Label(text, [r, g, b]) => {
             let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
@@ -307,8 +314,14 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
     }
 }
 
+/// Shows a text whose lines begin at the left and end where they end.
+fn paragraph(ui: &mut egui::Ui, text: RichText) {
+    ui.add(egui::Label::new(text).halign(egui::Align::LEFT));
+}
+
 fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {
-    let mut text = RichText::new(tr(&button.name)).size(15.0);
+    let name = if button.is_name { button.name.clone() } else { tr(&button.name) };
+    let mut text = RichText::new(name).size(15.0);
     let mut shape = egui::Button::new(text.clone()).wrap().min_size(egui::vec2(44.0, 30.0));
     if button.main {
         text = text.strong().color(Color32::BLACK);
@@ -360,7 +373,8 @@ fn write<A>(ui: &mut egui::Ui, [name, value, empty]: [&String; 3], does: fn(Stri
 fn slide<A>(ui: &mut egui::Ui, amount: &Amount, does: fn(f32) -> A, done: &mut Vec<A>) {
     let (mut value, [low, high]) = (amount.value, amount.range);
     ui.spacing_mut().slider_width = (0.5 * ui.available_width()).clamp(100.0, 240.0);
-    let shown = ui.add(egui::Slider::new(&mut value, low..=high).step_by(amount.step.into()));
+    let shown = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into());
+    let shown = ui.add(shown.fixed_decimals(if amount.step < 1.0 { 2 } else { 0 }));
     let name = ui.label(RichText::new(tr(&amount.name)).color(PALE));
     if shown.labelled_by(name.id).changed() {
         done.push(does(value));
@@ -407,12 +421,18 @@ fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
 
 fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {
     let columns = rows.first().map_or(1, Vec::len);
-    let grid = egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).spacing([18.0, 8.0]);
-    grid.max_col_width(0.4 * ui.available_width()).show(ui, |ui| {
+    let grid = egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).spacing([12.0, 8.0]);
+    let first = (0.32 * ui.available_width()).max(120.0);
+    grid.show(ui, |ui| {
         for (at, row) in rows.iter().enumerate() {
-            for cell in row {
+            for (place, cell) in row.iter().enumerate() {
                 let text = RichText::new(tr(cell)).size(14.0).color(INK);
-                ui.label(if at == 0 { text.strong() } else { text });
+                let label = egui::Label::new(if at == 0 { text.strong() } else { text });
+                // Only the first column holds sentences.
+                match place {
+                    0 => _ = ui.scope(|ui| (ui.set_max_width(first), ui.add(label.wrap()))),
+                    _ => _ = ui.add(label.extend()),
+                }
             }
             ui.end_row();
         }

@@ -7,7 +7,7 @@ use super::keys::{Command, label};
 use super::look::Look;
 use super::palette::{GREEN, ORANGE, SKY};
 use super::plot::{Drawn, Trace};
-use super::words::tr;
+use super::words::{sentence, tr};
 use super::{Choice, Panel, tool_icon};
 use eframe::egui::{self, Color32, RichText};
 
@@ -54,7 +54,7 @@ pub(crate) fn show(
         ui.add_space(8.0);
         ui.label(RichText::new(tr(&panel.phase)).size(22.0).strong());
         ui.label(RichText::new(format!("{} {}", tr("case"), panel.case)).weak());
-        ui.label(RichText::new(tr(&panel.hint)).size(15.0).strong());
+        ui.label(RichText::new(sentence(&tr(&panel.hint))).size(15.0).strong());
         ui.separator();
         force(ui, panel, traces);
         grid(ui, "task", &panel.task, 16.0);
@@ -105,7 +105,7 @@ fn heading(ui: &mut egui::Ui, text: String) {
 
 fn force(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
     heading(ui, tr(&format!("Force  {:.2} N", panel.force_n)));
-    traces.force.show(ui, Drawn { name: "force", height: 72.0, mark: panel.force_limit_n.into(), colour: SKY });
+    traces.force.show(ui, Drawn { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
     let most = traces.force.most();
     let note = format!("last {SECONDS_SHOWN:.0} s, most {most:.2} N, limit {:.1} N", panel.force_limit_n);
     ui.label(RichText::new(tr(&note)).size(12.0)).on_hover_text(tr("what your hand would feel on a device with force"));

@@ -57,24 +57,38 @@ impl Language {
         if let Some(found) = self.find(&key) {
             return filled(&found, &numbers);
         }
-        let parts = JOINTS.iter().find_map(|joint| text.split_once(joint).map(|(head, tail)| (head, *joint, tail)));
-        if let Some((head, joint, tail)) = parts {
+        if let Some((head, joint, tail)) = self.parts(text) {
             return [&*self.translate(head, missing), joint, &self.translate(tail, missing)].concat();
         }
         missing.insert(key);
         text.into()
     }
 
+    /// Takes a text apart where a part has a line of its own, else at the first joint.
+    fn parts<'a>(&self, text: &'a str) -> Option<(&'a str, &'a str, &'a str)> {
+        let apart = |(at, joint): (usize, &'a str)| (&text[..at], joint, &text[at + joint.len()..]);
+        let all = || JOINTS.iter().flat_map(|joint| text.match_indices(joint)).map(apart);
+        let has_line = |part: &str| self.find(&template(part).0).is_some();
+        let both = all().find(|(head, _, tail)| has_line(head) && has_line(tail));
+        both.or_else(|| all().find(|(head, _, tail)| has_line(head) || has_line(tail))).or_else(|| all().next())
+    }
+
     /// Finds a line for a text, or for the same text with a small first letter.
     fn find(&self, key: &str) -> Option<String> {
-        let with_first = |text: &str, case: fn(char) -> char| {
-            let mut letters = text.chars();
-            letters.next().map_or_else(String::new, |first| [case(first)].into_iter().chain(letters).collect())
-        };
-        let small = || self.texts.get(&with_first(key, |first| first.to_ascii_lowercase()));
-        let begun = || small().map(|found| with_first(found, |first| first.to_uppercase().next().unwrap_or(first)));
+        let small = |letter: char| letter.to_lowercase().next().unwrap_or(letter);
+        let begun = || self.texts.get(&with_first(key, small)).map(|found| sentence(found));
         self.texts.get(key).cloned().or_else(begun)
     }
+}
+
+/// Begins a text with a large letter.
+pub(crate) fn sentence(text: &str) -> String {
+    with_first(text, |letter| letter.to_uppercase().next().unwrap_or(letter))
+}
+
+fn with_first(text: &str, case: fn(char) -> char) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| [case(first)].into_iter().chain(letters).collect())
 }
 
 /// Takes the numbers out of a text. A digit that follows a letter, as in F1 and mm3, is none.
@@ -129,6 +143,7 @@ mod tests {
         assert_eq!(tr("The drill has stalled: press less"), "Der Bohrer steht: weniger drücken");
         assert_eq!(tr("3.2"), "3.2");
         assert!(missing().is_empty());
+        assert_eq!(tr("x: y, about 3 s left"), "x: y, noch etwa 3 s", "at the joint before a known part");
         assert_eq!(tr("press less, 3 times"), "weniger drücken, 3 times");
         assert_eq!(missing(), ["{} times"]);
         speak(None);

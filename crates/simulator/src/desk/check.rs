@@ -258,7 +258,7 @@ impl Check {
         let notes = self.case.notes.iter().map(|note| Item::Note(printable(note)));
         head.extend(notes);
         Page {
-            title: format!("Check {}", printable(&self.name)),
+            title: format!("Check: {}", printable(&self.name)),
             line: "Right and left, the fit of CT and MRI, the tissue labels, the place of the opening".into(),
             columns: vec![self.slices_part(), head],
             foot: vec![

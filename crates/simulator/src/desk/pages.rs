@@ -120,7 +120,7 @@ fn recent(at: usize, recent: &Recent) -> Item<Action> {
     };
     let hash = recent.hash.get(..8).unwrap_or("not built yet");
     Item::Row(vec![
-        Item::button(printable(&recent.name), "chooses this case", Action::Recent(at)),
+        Item::named(printable(&recent.name), "chooses this case", Action::Recent(at)),
         Item::Note(format!("{kind}, {hash}")),
         Item::button("x", "takes it off this list; its files stay", Action::Forget(at)),
     ])
@@ -181,7 +181,7 @@ pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action>
     let places: Vec<Item<Action>> = up.into_iter().chain(home).chain([top]).collect();
     let written = Item::Field("Folder".into(), written.into(), "a path".into(), Action::Path);
     let entry = |name: &String, does: fn(PathBuf, Goal) -> Action| {
-        Item::button(printable(name), String::new(), does(path.join(name), goal))
+        Item::named(printable(name), String::new(), does(path.join(name), goal))
     };
     let folders = folder.folders.iter().map(|name| entry(name, |path, _| Action::Into(path))).collect::<Vec<_>>();
     let files = folder.files.iter().map(|name| entry(name, |path, goal| Action::Take(goal, path))).collect::<Vec<_>>();
@@ -193,7 +193,7 @@ pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action>
     } else if goal != Goal::Recording {
         foot.push(Item::closed("Use this folder", goal.line()));
     }
-    foot.push(Item::button("Back", "chooses nothing", Action::Home));
+    foot.push(Item::button("Cancel", "chooses nothing", Action::Home));
     foot.extend(folder.fault.clone().map(Item::Note));
     let of_folders = [Item::Row(places), written, Item::Heading("Folders".into())].into_iter().chain(folders);
     let none = files.is_empty().then(|| Item::Note(goal.none().into()));
@@ -219,7 +219,7 @@ pub(crate) fn sort(path: &Path) -> Page<Action> {
             take("The CT", "shows the skull", Goal::Ct),
             take("The MRI", "shows the brain", Goal::Mri),
         ])]],
-        foot: vec![Item::button("Back", "takes nothing", Action::Home)],
+        foot: vec![Item::button("Cancel", "takes nothing", Action::Home)],
         escape: Some(Action::Home),
         ..Page::default()
     }
@@ -228,7 +228,7 @@ pub(crate) fn sort(path: &Path) -> Page<Action> {
 /// The page while a session is loading, or over a draft of its scene.
 pub(crate) fn loading(name: &str, (share, line): (f32, String)) -> Page<Action> {
     Page {
-        title: format!("Loading {}", printable(name)),
+        title: format!("Loading: {}", printable(name)),
         line: String::new(),
         columns: vec![vec![
             Item::Progress(share, line),

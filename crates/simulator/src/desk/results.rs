@@ -64,7 +64,7 @@ fn when(title: &str) -> String {
 }
 
 fn table(debrief: &Debrief) -> Vec<Vec<String>> {
-    let heading = ["measure", "value", "limit", "kept", "mean of earlier"].map(String::from);
+    let heading = ["measure", "value", "limit", "kept", "earlier mean"].map(String::from);
     let row = |row: &Row| {
         let kept = row.passed.map_or("", |passed| if passed { "yes" } else { "no" });
         vec![row.what.clone(), row.value.clone(), row.limit.clone(), kept.into(), row.earlier.clone()]

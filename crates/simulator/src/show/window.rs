@@ -381,7 +381,7 @@ pub(crate) const SWITCHES: [(&str, char, u32); 5] = [
     ("Show the trainee my tool", 'g', TeacherRecord::GHOST),
     ("Mark the place of my tool", 'k', TeacherRecord::MARKER),
     ("Pause the trainee", 'j', TeacherRecord::PAUSE),
-    ("Take the drill's power", 'w', TeacherRecord::NO_POWER),
+    ("Take the drill's power", 'a', TeacherRecord::NO_POWER),
     ("Let the patient bleed", 'h', TeacherRecord::BLEEDING),
 ];
 
