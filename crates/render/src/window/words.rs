@@ -3,7 +3,7 @@
 //! # Practice
 //! The English text is the key, looked up where the window puts it on screen. A number in a text
 //! stands as `{}` in key and translation: "{} mm apart". A text without a line of its own is taken
-//! apart at "; ", ": " and ", ". What is missing stays English and is kept for translators. One
+//! apart at "; ", ": " and ", ". What is missing stays English; [`missing`] lists it. One
 //! letter, as in a unit or a key, is no word.
 
 use std::cell::RefCell;
