@@ -24,6 +24,7 @@ impl Person {
     /// Sits down in front of the program; `None` where the tools are missing.
     fn sits_down(home: &Path, settings: &str) -> Option<Self> {
         Command::new("xdotool").arg("version").output().ok()?;
+        Command::new("import").arg("-version").output().ok()?;
         let mut screen = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "1280x800x24"])
             .stdout(Stdio::piped())
@@ -62,6 +63,23 @@ impl Person {
         std::thread::sleep(Duration::from_millis(300));
         self.does("click 1");
         std::thread::sleep(Duration::from_millis(700));
+    }
+
+    /// Middle of the button of the usual next step: the first large patch in its colour, sky blue.
+    fn main_button(&self) -> Option<[u32; 2]> {
+        let args = ["-window", "root", "-depth", "8", "rgb:-"];
+        let pixels = Command::new("import").args(args).env("DISPLAY", &self.display).output().ok()?.stdout;
+        let is_sky = |x: usize, y: usize| pixels.get(3 * (y * WIDTH + x)..).is_some_and(|rgb| rgb.starts_with(&SKY));
+        let is_patch = |x: usize, y: usize| (0..6).all(|n| is_sky(x + 6 * n, y) && is_sky(x, y + n));
+        let places = (0..pixels.len() / 3).map(|at| (at % WIDTH, at / WIDTH));
+        let (x, y) = places.filter(|(x, _)| x + 40 < WIDTH).find(|(x, y)| is_patch(*x, *y))?;
+        Some([x as u32 + 20, y as u32 + 12])
+    }
+
+    /// Presses the button of the usual next step once it is there.
+    fn goes_on(&self) {
+        self.waits_for("the next step", || self.main_button().is_some());
+        self.clicks(self.main_button().unwrap());
     }
 
     fn waits_for(&self, what: &str, done: impl Fn() -> bool) {
@@ -115,13 +133,12 @@ impl Drop for Person {
     }
 }
 
-/// Controls at 1280 by 800: "Start the operation", "Back to the start page", "Open CT...", the
-/// first folder of the dialogue and "Use this folder".
-const START: [u32; 2] = [95, 755];
-const BACK: [u32; 2] = [110, 755];
+/// Pixels in a row of the display, and the colour of the main button.
+const WIDTH: usize = 1280;
+const SKY: [u8; 3] = [86, 180, 233];
+/// Controls at 1280 by 800: "Open CT..." and the first folder of the dialogue.
 const OPEN_CT: [u32; 2] = [160, 135];
 const FIRST_FOLDER: [u32; 2] = [200, 186];
-const USE: [u32; 2] = [85, 755];
 
 #[test]
 fn a_person_opens_the_built_in_case_and_then_a_dicom_folder() {
@@ -134,12 +151,14 @@ fn a_person_opens_the_built_in_case_and_then_a_dicom_folder() {
         eprintln!("Xvfb or xdotool is missing: nobody sat down");
         return;
     };
-    person.clicks(START);
+    person.goes_on();
     let first = person.operates(1);
     assert_eq!((first["case"].as_str(), first["person"].as_str()), (Some("case-head"), Some("Ada")));
-    for place in [BACK, OPEN_CT, FIRST_FOLDER, USE, START] {
-        person.clicks(place);
-    }
+    person.goes_on();
+    person.clicks(OPEN_CT);
+    person.clicks(FIRST_FOLDER);
+    person.goes_on();
+    person.goes_on();
     let second = person.operates(2);
     let case = second["case"].as_str().unwrap();
     assert!(case.starts_with("case-") && case != "case-head" && !case.contains("MUSTERMANN"), "{case}");

@@ -50,6 +50,20 @@ impl Image {
         written.map(|()| bytes).map_err(std::io::Error::other)
     }
 
+    /// Decodes a PNG file.
+    pub fn read_png(bytes: &[u8]) -> std::io::Result<Self> {
+        let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+        decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
+        let mut reader = decoder.read_info().map_err(std::io::Error::other)?;
+        let size = reader.output_buffer_size().ok_or_else(|| std::io::Error::other("the picture is too large"))?;
+        let mut rgba = vec![0; size];
+        let info = reader.next_frame(&mut rgba).map_err(std::io::Error::other)?;
+        match info.color_type {
+            png::ColorType::Rgba => Ok(Self { width: info.width, height: info.height, rgba }),
+            other => Err(std::io::Error::other(format!("the picture is not in colours but {other:?}"))),
+        }
+    }
+
     /// Writes a PNG file atomically, by renaming a temporary file.
     pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
         let part = path.with_extension("png.part");
@@ -121,6 +135,13 @@ impl Between {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_comes_back_from_its_file() {
+        let image = Image { width: 3, height: 2, rgba: (0..24).collect() };
+        assert_eq!(Image::read_png(&image.png().unwrap()).unwrap(), image);
+        assert!(Image::read_png(b"no picture").is_err());
+    }
 
     #[test]
     fn an_enlarged_ramp_is_a_finer_ramp() {

@@ -92,7 +92,7 @@ pub(crate) fn unused_key(input: &egui::InputState, panel: &Panel) -> Option<Stri
             (Key::Space, _) => panel.no_drill.clone(),
             (Key::OpenBracket | Key::CloseBracket, _) => (!replays).then(|| "events are in a replay only".into()),
             _ => number(key, panel).unwrap_or_else(|| {
-                Some(format!("the key {} has no use here: F1 shows all keys", key.symbol_or_name()))
+                Some(format!("this key has no use here: {}; F1 shows all keys", key.symbol_or_name()))
             }),
         }
     };
@@ -106,8 +106,8 @@ fn number(key: Key, panel: &Panel) -> Option<Option<String>> {
     Some(match choice.and_then(|choice| choice.options.get(slot).map(|option| (choice, option))) {
         _ if !panel.by_hand => Some(NOBODY.into()),
         None => Some(format!("there is no tool number {}", slot + 1)),
-        Some((choice, (name, _))) if choice.chosen == slot => Some(format!("the {name} is in the hand")),
-        Some((_, (name, false))) => Some(format!("the {name} cannot be taken now")),
+        Some((choice, (name, _))) if choice.chosen == slot => Some(format!("it is in the hand: {name}")),
+        Some((_, (name, Some(why)))) => Some(format!("{name}: {why}")),
         Some(_) => None,
     })
 }

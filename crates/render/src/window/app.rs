@@ -198,7 +198,7 @@ impl<S: Session, D: Draws> Window<S, D> {
     fn numbered(&self, input: &egui::InputState) -> Option<[usize; 2]> {
         let slot = answers::NUMBERS.iter().position(|key| input.key_pressed(*key))?;
         let choice = self.panel.choices.first().filter(|choice| !choice.tools.is_empty())?;
-        let open = choice.options.get(slot).is_some_and(|(_, open)| *open) && choice.chosen != slot;
+        let open = choice.options.get(slot).is_some_and(|(_, why_not)| why_not.is_none()) && choice.chosen != slot;
         open.then_some([0, slot])
     }
 
@@ -235,7 +235,13 @@ impl<S: Session, D: Draws> Window<S, D> {
                 self.lead(ui, &response, &view, &shared.session);
                 let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
                 let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
-                ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, self.quality.text(), font, grey);
+                ui.painter().text(
+                    corner,
+                    egui::Align2::LEFT_BOTTOM,
+                    super::words::tr(&self.quality.text()),
+                    font,
+                    grey,
+                );
                 shared.shown = true;
             }
         }
@@ -244,7 +250,9 @@ impl<S: Session, D: Draws> Window<S, D> {
     /// Shows the slices in a window of their own, for another screen.
     fn slices(&mut self, ui: &egui::Ui, aspect: f32) {
         let id = egui::ViewportId::from_hash_of("slices");
-        let window = egui::ViewportBuilder::default().with_title("Slices").with_inner_size([900.0 * aspect, 900.0]);
+        let window = egui::ViewportBuilder::default()
+            .with_title(super::words::tr("Slices"))
+            .with_inner_size([900.0 * aspect, 900.0]);
         let (screen, apart) = (&self.screen, &mut self.look.apart);
         ui.ctx().show_viewport_immediate(id, window, |ui, _| {
             let space = ui.max_rect();

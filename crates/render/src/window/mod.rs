@@ -53,6 +53,8 @@ mod plot;
 mod pointer;
 mod quality;
 mod screen;
+#[cfg(test)]
+mod spoken;
 mod surface;
 #[cfg(any(feature = "sound", test))]
 mod synthesis;
@@ -60,14 +62,16 @@ mod synthesis;
 mod tests;
 mod timeline;
 mod tool_icon;
+mod words;
 
 pub use capture::Capture;
 pub use draws::{Draws, Refined};
-pub use host::{Host, Offers, Shown, Stage, open, stage};
+pub use host::{Host, Offers, Pages, Shown, Stage, open, stage};
 pub use input::{Pace, WindowInput};
 pub use page::{Amount, Button, Choosable, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};
+pub use words::{Language, missing, speak, tr};
 
 use crate::{Camera, Frame, Image, Renderer};
 use std::any::Any;

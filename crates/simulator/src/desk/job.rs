@@ -30,7 +30,7 @@ pub(crate) struct Job {
 
 /// Seconds of each stage of loading where nothing was measured yet, numerical: for a case of a head
 /// on two cores.
-const USUAL_S: [(&str, f64); 13] = [
+pub(super) const USUAL_S: [(&str, f64); 13] = [
     ("looking at the images", 0.5),
     ("reading the CT", 1.0),
     ("reading the MRI", 1.0),

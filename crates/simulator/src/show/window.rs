@@ -18,6 +18,7 @@ use crate::show::keep::Keeper;
 use crate::show::notice_text;
 use crate::show::picture::{Album, Moving, camera, frame, microscope, snap};
 use crate::show::raycast::Raycast;
+use crate::stages::notice::Notice;
 use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
@@ -81,7 +82,8 @@ impl Shown {
     pub fn panel(&self, view: &View, by_hand: bool) -> Panel {
         let mut panel = notice_text::panel(&self.case, self.program, view);
         if !by_hand {
-            panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
+            let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
+            options.for_each(|(_, why_not)| *why_not = Some(NOT_IN_HAND.into()));
         }
         panel
     }
@@ -276,7 +278,7 @@ impl window::Session for Show {
         let flap = || Action {
             name: "Lift the flap, or put it back".into(),
             key: Some('f'),
-            why_not: self.no_flap.then(|| "no flap is planned: start with --flap and its diameter, mm".into()),
+            why_not: self.no_flap.then(|| Notice::NO_FLAP.into()),
             ..Action::default()
         };
         let mut panel = self.shown.panel(view, by_hand);
@@ -368,15 +370,18 @@ impl Lesson {
     }
 }
 
+/// Why no tool can be taken here.
+pub(crate) const NOT_IN_HAND: &str = "another device, a script or a recording moves the tool";
+
 /// Hint for a teacher.
-const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";
+pub(crate) const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";
 
 /// A teacher's switches: text, key and bit.
-const SWITCHES: [(&str, char, u32); 5] = [
+pub(crate) const SWITCHES: [(&str, char, u32); 5] = [
     ("Show the trainee my tool", 'g', TeacherRecord::GHOST),
     ("Mark the place of my tool", 'k', TeacherRecord::MARKER),
     ("Pause the trainee", 'j', TeacherRecord::PAUSE),
-    ("Take the drill's power", 'w', TeacherRecord::NO_POWER),
+    ("Take the drill's power", 'a', TeacherRecord::NO_POWER),
     ("Let the patient bleed", 'h', TeacherRecord::BLEEDING),
 ];
 
