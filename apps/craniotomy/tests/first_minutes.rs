@@ -137,8 +137,8 @@ impl Drop for Person {
 const WIDTH: usize = 1280;
 const SKY: [u8; 3] = [86, 180, 233];
 /// Controls at 1280 by 800: "Open CT..." and the first folder of the dialogue.
-const OPEN_CT: [u32; 2] = [160, 135];
-const FIRST_FOLDER: [u32; 2] = [200, 186];
+const OPEN_CT: [u32; 2] = [162, 404];
+const FIRST_FOLDER: [u32; 2] = [250, 220];
 
 #[test]
 fn a_person_opens_the_built_in_case_and_then_a_dicom_folder() {

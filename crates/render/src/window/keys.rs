@@ -116,7 +116,7 @@ pub(crate) fn help(context: &egui::Context, actions: &[Action]) {
     let page = egui::Window::new(tr("Keys and mouse")).collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);
     let width = (screen.width() - 60.0).min(WIDEST);
     page.max_width(width).show(context, |ui| {
-        egui::ScrollArea::vertical().max_height(screen.height() - 90.0).show(ui, |ui| {
+        egui::ScrollArea::vertical().min_scrolled_height(screen.height() - 90.0).show(ui, |ui| {
             egui::Grid::new("keys").num_columns(2).striped(true).min_col_width(0.3 * width).show(ui, |ui| {
                 let mut row = |key: &str, words: &str| {
                     let column = |ui: &mut egui::Ui, share: f32, text: RichText| {

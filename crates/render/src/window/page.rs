@@ -316,7 +316,10 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
 
 /// Shows a text whose lines begin at the left and end where they end.
 fn paragraph(ui: &mut egui::Ui, text: RichText) {
-    ui.add(egui::Label::new(text).halign(egui::Align::LEFT));
+    match ui.layout().horizontal_justify() {
+        true => _ = ui.with_layout(egui::Layout::top_down(egui::Align::LEFT), |ui| ui.label(text)),
+        false => _ = ui.label(text),
+    }
 }
 
 fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {

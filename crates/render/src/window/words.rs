@@ -3,8 +3,8 @@
 //! # Practice
 //! The English text is the key, looked up where the window puts it on screen. A number in a text
 //! stands as `{}` in key and translation: "{} mm apart". A text without a line of its own is taken
-//! apart at "; ", ": " and ", ". What is missing stays English and is kept for translators. One letter, as in a unit or a key, is
-//! no word.
+//! apart at "; ", ": " and ", ". What is missing stays English and is kept for translators. One
+//! letter, as in a unit or a key, is no word.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
