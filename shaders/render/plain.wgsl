@@ -1,7 +1,7 @@
-// Shows a finished picture in a part of the window, pixel by pixel.
+// Shows a finished picture in a part of the window.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
-@group(0) @binding(1) var nearest: sampler;
+@group(0) @binding(1) var filtered: sampler;
 
 struct Corner { @builtin(position) clip: vec4f, @location(0) at: vec2f }
 
@@ -10,4 +10,4 @@ struct Corner { @builtin(position) clip: vec4f, @location(0) at: vec2f }
     return Corner(vec4f(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, 0.0, 1.0), at);
 }
 
-@fragment fn fragment(v: Corner) -> @location(0) vec4f { return textureSampleLevel(picture, nearest, v.at, 0.0); }
+@fragment fn fragment(v: Corner) -> @location(0) vec4f { return textureSampleLevel(picture, filtered, v.at, 0.0); }

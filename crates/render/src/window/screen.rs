@@ -216,7 +216,9 @@ impl Plain {
             let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
             if self.parts.get(n).is_none_or(|(texture, _)| texture.size() != size) {
                 self.parts.truncate(n);
-                self.parts.push(self.sized(state, size));
+                // The first part is shown pixel by pixel, slices may be enlarged.
+                let filter = if n == 0 { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
+                self.parts.push(self.sized(state, size, filter));
             }
             let layout = wgpu::TexelCopyBufferLayout {
                 offset: 4 * (u64::from(x) + u64::from(image.width) * u64::from(y)),
@@ -227,7 +229,12 @@ impl Plain {
         }
     }
 
-    fn sized(&self, state: &RenderState, size: wgpu::Extent3d) -> (wgpu::Texture, wgpu::BindGroup) {
+    fn sized(
+        &self,
+        state: &RenderState,
+        size: wgpu::Extent3d,
+        filter: wgpu::FilterMode,
+    ) -> (wgpu::Texture, wgpu::BindGroup) {
         let texture = state.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size,
@@ -239,7 +246,11 @@ impl Plain {
             view_formats: &[],
         });
         let view = texture.create_view(&Default::default());
-        let sampler = state.device.create_sampler(&Default::default());
+        let sampler = state.device.create_sampler(&wgpu::SamplerDescriptor {
+            mag_filter: filter,
+            min_filter: filter,
+            ..Default::default()
+        });
         let group = state.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("plain"),
             layout: &self.pipeline.get_bind_group_layout(0),
