@@ -205,7 +205,6 @@ pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action>
         foot,
         escape: Some(Action::Home),
         steady: true,
-        ..Page::default()
     }
 }
 
