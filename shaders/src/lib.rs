@@ -36,7 +36,7 @@ pub const RENDER_ANAGLYPH: &str = picture!("anaglyph.wgsl");
 pub const RENDER_SECTION: &str = picture!("section.wgsl");
 
 /// Shows a finished picture in a part of the window.
-pub const RENDER_PLAIN: &str = include_str!("../render/plain.wgsl");
+pub const RENDER_SCREEN: &str = include_str!("../render/screen.wgsl");
 
 /// Prepends the text of `step.wgsl`.
 macro_rules! tled {

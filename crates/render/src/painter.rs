@@ -127,8 +127,8 @@ impl Painter {
     }
 
     /// Adapts the pictures to an area of `size` pixels, with a fraction `detail` of the 3-D view's
-    /// pixels along an edge. Below 1 the processor also casts every second ray where bone is smooth,
-    /// and draws one slice per picture.
+    /// pixels along an edge. Below 1 the processor also casts every second ray where bone is
+    /// smooth, and draws one slice per picture.
     pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
         if let By::Processor(processor) = &mut self.by {
             processor.slices_per_frame = if detail < 1.0 { 1 } else { 3 };

@@ -353,7 +353,7 @@ mod tests {
         (0..8).map(of).collect()
     }
 
-    /// Largest distance at rest of masses that springs press by 2 mm, mm: the masses' own springs
+    /// Largest distance at rest of masses that springs press by 2 mm, mm. The masses' own springs
     /// hold no more energy than the pressing ones had at the start.
     fn farthest_mm(springs: &[NodalContact]) -> f32 {
         let own = 3.6f32 / (0.25 * 0.5);

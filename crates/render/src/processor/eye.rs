@@ -177,8 +177,8 @@ impl Eye {
         });
     }
 
-    /// Enlarges the view into the picture; for an anaglyph, only green and blue, over the other eye's
-    /// luminance.
+    /// Enlarges the view into the picture; for an anaglyph, only green and blue, over the other
+    /// eye's luminance.
     pub fn show(&self, picture: &mut Image, in_one: bool, threads: usize) {
         let [x, y, width, height] = self.area.map(|n| n as usize);
         let wide = picture.width as usize;

@@ -180,7 +180,7 @@ impl Plain {
     fn new(state: &RenderState) -> Self {
         let module = state.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("plain"),
-            source: wgpu::ShaderSource::Wgsl(trepan_shaders::RENDER_PLAIN.into()),
+            source: wgpu::ShaderSource::Wgsl(trepan_shaders::RENDER_SCREEN.into()),
         });
         let target = state.target_format;
         let pipeline = state.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
