@@ -35,6 +35,9 @@ pub const RENDER_ANAGLYPH: &str = picture!("anaglyph.wgsl");
 /// The brain cut by a slice, as rest positions.
 pub const RENDER_SECTION: &str = picture!("section.wgsl");
 
+/// Shows a finished picture in a part of the window.
+pub const RENDER_PLAIN: &str = include_str!("../render/plain.wgsl");
+
 /// Prepends the text of `step.wgsl`.
 macro_rules! tled {
     ($($file:literal),+) => {

@@ -23,24 +23,10 @@ impl Image {
 
     /// Enlarges the picture with bilinear interpolation; unchanged if it has the size.
     pub fn enlarged(&self, [width, height]: [u32; 2]) -> Self {
-        if (self.width, self.height) == (width, height) {
-            return self.clone();
-        }
-        let [columns, rows] = [(self.width, width), (self.height, height)].map(|(from, to)| between(from, to));
-        let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
-        for &(y, below) in &rows {
-            for &(x, right) in &columns {
-                let corner = |i: u32, j: u32| {
-                    self.pixel((x + i).min(self.width - 1), (y + j).min(self.height - 1)).map(f32::from)
-                };
-                let (a, b, c, d) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1));
-                let mix = |k: usize| {
-                    let (upper, lower) = (a[k] + right * (b[k] - a[k]), c[k] + right * (d[k] - c[k]));
-                    (upper + below * (lower - upper)).round() as u8
-                };
-                rgba.extend([0, 1, 2, 3].map(mix));
-            }
-        }
+        let mut rgba = vec![0; 4 * width as usize * height as usize];
+        let enlarge = Enlarge::of(bytemuck::cast_slice(&self.rgba), [self.width, self.height], [width, height]);
+        let rows = rgba.chunks_exact_mut(4 * width.max(1) as usize).enumerate();
+        rows.for_each(|(y, row)| enlarge.row(y, bytemuck::cast_slice_mut(row)));
         Self { width, height, rgba }
     }
 
@@ -64,6 +50,20 @@ impl Image {
         written.map(|()| bytes).map_err(std::io::Error::other)
     }
 
+    /// Decodes a PNG file.
+    pub fn read_png(bytes: &[u8]) -> std::io::Result<Self> {
+        let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+        decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
+        let mut reader = decoder.read_info().map_err(std::io::Error::other)?;
+        let size = reader.output_buffer_size().ok_or_else(|| std::io::Error::other("the picture is too large"))?;
+        let mut rgba = vec![0; size];
+        let info = reader.next_frame(&mut rgba).map_err(std::io::Error::other)?;
+        match info.color_type {
+            png::ColorType::Rgba => Ok(Self { width: info.width, height: info.height, rgba }),
+            other => Err(std::io::Error::other(format!("the picture is not in colours but {other:?}"))),
+        }
+    }
+
     /// Writes a PNG file atomically, by renaming a temporary file.
     pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
         let part = path.with_extension("png.part");
@@ -72,17 +72,76 @@ impl Image {
     }
 }
 
-/// For each of `to` pixels in a row, the pixel of `from` at or before its centre, and the weight of
-/// the next.
-fn between(from: u32, to: u32) -> Vec<(u32, f32)> {
-    let share = from as f32 / to.max(1) as f32;
-    let at = |n: u32| ((n as f32 + 0.5) * share - 0.5).clamp(0.0, from.saturating_sub(1) as f32);
-    (0..to).map(at).map(|at| (at as u32, at.fract())).collect()
+/// Enlarges a grid of colours row by row, with bilinear interpolation.
+pub(crate) struct Enlarge<'a> {
+    from: &'a [[u8; 4]],
+    width: usize,
+    columns: Vec<Between>,
+    rows: Vec<Between>,
+}
+
+/// Where a pixel lies in the smaller picture.
+#[derive(Clone, Copy)]
+struct Between {
+    /// The pixel at or before its centre.
+    first: usize,
+    /// The one after, within the picture.
+    second: usize,
+    /// Weight of the second, of 256.
+    share: u32,
+}
+
+impl<'a> Enlarge<'a> {
+    /// From a size to another, width and height in pixels.
+    pub fn of(from: &'a [[u8; 4]], size: [u32; 2], to: [u32; 2]) -> Self {
+        let [columns, rows] = [0, 1].map(|n| Between::all(size[n], to[n]));
+        Self { from, width: size[0] as usize, columns, rows }
+    }
+
+    /// Fills row `y` of the larger picture.
+    pub fn row(&self, y: usize, to: &mut [[u8; 4]]) {
+        let Between { first, second, share } = self.rows[y];
+        let [upper, lower] = [first, second].map(|y| &self.from[self.width * y..self.width * (y + 1)]);
+        if share == 0 && self.width == to.len() {
+            return to.copy_from_slice(upper);
+        }
+        // The two rows are mixed first: they have fewer pixels.
+        let down: Vec<[u32; 4]> = upper
+            .iter()
+            .zip(lower)
+            .map(|(a, b)| [0, 1, 2, 3].map(|c| u32::from(a[c]) * (256 - share) + u32::from(b[c]) * share))
+            .collect();
+        for (pixel, at) in to.iter_mut().zip(&self.columns) {
+            let (a, b) = (down[at.first], down[at.second]);
+            *pixel = [0, 1, 2, 3].map(|c| ((a[c] * (256 - at.share) + b[c] * at.share + (1 << 15)) >> 16) as u8);
+        }
+    }
+}
+
+impl Between {
+    /// For each of `to` pixels in a row of `from`.
+    fn all(from: u32, to: u32) -> Vec<Self> {
+        let (scale, last) = (from as f32 / to.max(1) as f32, from.saturating_sub(1));
+        let at = |n: u32| ((n as f32 + 0.5) * scale - 0.5).clamp(0.0, last as f32);
+        let between = |at: f32| Self {
+            first: at as usize,
+            second: (at as usize + 1).min(last as usize),
+            share: (256.0 * at.fract()).round() as u32,
+        };
+        (0..to).map(at).map(between).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_comes_back_from_its_file() {
+        let image = Image { width: 3, height: 2, rgba: (0..24).collect() };
+        assert_eq!(Image::read_png(&image.png().unwrap()).unwrap(), image);
+        assert!(Image::read_png(b"no picture").is_err());
+    }
 
     #[test]
     fn an_enlarged_ramp_is_a_finer_ramp() {

@@ -11,7 +11,7 @@
 use crate::frame::{Frame, SceneData};
 use crate::image::Image;
 use crate::kept::Kept;
-use crate::report::{DrawReport, LEAST_DETAIL};
+use crate::report::DrawReport;
 use crate::{Casting, ProcessorRenderer, RenderError, Renderer, View};
 use trepan_gpu::{Gpu, GpuError, Prefer};
 
@@ -21,27 +21,8 @@ pub struct Painter {
     by: By,
     kept: Kept,
     notice: Option<String>,
-    quality: Quality,
-}
-
-/// Resolution and sampling of a picture.
-#[derive(Clone, Copy, Debug)]
-struct Quality {
-    sparse: bool,
-    detail: f32,
-    /// Size of the returned pictures, pixels.
-    size: [u32; 2],
-}
-
-impl Quality {
-    fn full(size: [u32; 2]) -> Self {
-        Self { sparse: false, detail: 1.0, size }
-    }
-
-    /// Size that the processor draws.
-    fn drawn(&self) -> [u32; 2] {
-        self.size.map(|n| ((n as f32 * self.detail).round() as u32).clamp(n.min(1), n))
-    }
+    /// Whether rays are sparse, and the fraction of the 3-D view's pixels along an edge.
+    quality: (bool, f32),
 }
 
 #[derive(Debug)]
@@ -62,8 +43,7 @@ impl Painter {
         let kept = Kept::of(data)?;
         let why = match device.map_err(RenderError::from).and_then(|gpu| Renderer::new(&gpu, data, size)) {
             Ok(renderer) => {
-                let (by, quality) = (By::Device(Box::new(renderer)), Quality::full(size));
-                return Ok(Self { by, kept, notice: None, quality });
+                return Ok(Self { by: By::Device(Box::new(renderer)), kept, notice: None, quality: (false, 1.0) });
             }
             Err(RenderError::Gpu(why)) => why,
             Err(other) => return Err(other),
@@ -78,20 +58,18 @@ impl Painter {
 
     fn processor(kept: Kept, size: [u32; 2]) -> Result<Self, RenderError> {
         let processor = ProcessorRenderer::with(kept.clone(), size)?;
-        Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: Quality::full(size) })
+        Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: (false, 1.0) })
     }
 
-    /// Draws a fraction of the pixels along an edge, from 0.05 to 1, and enlarges the picture to
-    /// full size. With `sparse` the processor casts every second ray where bone is smooth. For a
-    /// fixed picture size; for a changing area use [`fit`](Self::fit).
+    /// Draws the 3-D view with a fraction of the pixels along an edge, from 0.05 to 1, and enlarges
+    /// it. With `sparse` the processor casts every second ray where bone is smooth.
     pub fn set_quality(&mut self, sparse: bool, detail: f32) -> Result<(), RenderError> {
-        let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
-        self.quality = Quality { sparse, detail, ..self.quality };
+        self.quality = (sparse, detail);
         match &mut self.by {
             By::Device(renderer) => renderer.set_detail(detail),
             By::Processor(processor) => {
                 processor.set_casting(Casting { sparse, ..processor.casting() });
-                processor.resize(self.quality.drawn())
+                processor.set_detail(detail)
             }
         }
     }
@@ -101,7 +79,7 @@ impl Painter {
         let (why, size) = match &mut self.by {
             By::Processor(processor) => {
                 let report = processor.draw(frame)?;
-                return Ok((processor.image().enlarged(self.quality.size), report));
+                return Ok((processor.image().clone(), report));
             }
             By::Device(renderer) => match on_device(renderer, frame) {
                 Err(RenderError::Gpu(why)) => (why, renderer.size()),
@@ -110,7 +88,8 @@ impl Painter {
         };
         self.notice = Some(format!("{why}; the processor draws from here on"));
         self.by = By::Processor(Box::new(ProcessorRenderer::with(self.kept.clone(), size)?));
-        self.set_quality(self.quality.sparse, self.quality.detail)?;
+        let (sparse, detail) = self.quality;
+        self.set_quality(sparse, detail)?;
         self.picture(frame)
     }
 
@@ -126,7 +105,7 @@ impl Painter {
     /// The last picture, as it is now.
     pub fn image(&self) -> Result<Image, RenderError> {
         match &self.by {
-            By::Processor(processor) => Ok(processor.image().enlarged(self.quality.size)),
+            By::Processor(processor) => Ok(processor.image().clone()),
             By::Device(renderer) => renderer.image(),
         }
     }
@@ -141,27 +120,21 @@ impl Painter {
 
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
-        self.quality.size = size;
         match &mut self.by {
             By::Device(renderer) => renderer.resize(size),
-            By::Processor(processor) => processor.resize(self.quality.drawn()),
+            By::Processor(processor) => processor.resize(size),
         }
     }
 
-    /// Adapts the pictures to an area of `size` pixels, with a fraction `detail` of the pixels
-    /// along an edge. Below 1, a device draws the 3-D view with fewer pixels; the processor draws
-    /// smaller pictures, and casts every second ray where bone is smooth.
+    /// Adapts the pictures to an area of `size` pixels, with a fraction `detail` of the 3-D view's
+    /// pixels along an edge. Below 1 the processor also casts every second ray where bone is smooth,
+    /// and draws one slice per picture.
     pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
-        match &mut self.by {
-            By::Device(renderer) => renderer.set_detail(detail).and_then(|()| renderer.resize(size)),
-            By::Processor(processor) => {
-                let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
-                processor.set_casting(Casting { sparse: detail < 1.0, ..processor.casting() });
-                // A window enlarges the picture itself.
-                self.quality = Quality::full(Quality { detail, ..Quality::full(size) }.drawn());
-                processor.resize(self.quality.size)
-            }
+        if let By::Processor(processor) = &mut self.by {
+            processor.slices_per_frame = if detail < 1.0 { 1 } else { 3 };
         }
+        self.set_quality(detail < 1.0, detail)?;
+        self.resize(size)
     }
 
     /// The camera of a frame as vectors, for the 3-D view of this picture.

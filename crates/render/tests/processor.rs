@@ -177,8 +177,53 @@ fn without_a_device_the_processor_draws_and_says_why() {
     assert_eq!(([image.width, image.height], report.pixels_cast), ([120, 100], (120 - 33) * 100));
     painter.fit([120, 100], 0.25).expect("a quarter of the detail");
     let (image, _) = painter.picture(&frame).expect("drawn");
-    assert_eq!([image.width, image.height], [30, 25]);
+    assert_eq!([image.width, image.height], [120, 100]);
     assert!(painter.renderer().is_none() && painter.into_renderer().is_err());
+}
+
+#[test]
+fn with_less_detail_the_view_is_enlarged_and_slices_stay_sharp() {
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let mut renderer = ProcessorRenderer::new(&data, [240, 200]).expect("the scene loads");
+    renderer.draw(&frame).expect("drawn");
+    let (full, layout) = (renderer.image().clone(), renderer.layout());
+    renderer.set_detail(0.5).expect("half the detail");
+    assert_eq!(renderer.draw(&frame).expect("drawn").pixels_cast * 4, layout.view[2] * layout.view[3]);
+    let coarse = renderer.image().clone();
+    let same = |part: [u32; 4]| {
+        let [x, y, w, h] = part;
+        let alike = |&(x, y): &(u32, u32)| full.pixel(x, y) == coarse.pixel(x, y);
+        (y..y + h).flat_map(|y| (x..x + w).map(move |x| (x, y))).filter(alike).count() == (w * h) as usize
+    };
+    assert!(layout.slices.expect("there is room").into_iter().all(same) && !same(layout.view));
+    assert!(similarity(&full, &coarse) > 0.9);
+}
+
+#[test]
+fn slices_are_drawn_in_turn() {
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let mut renderer = ProcessorRenderer::new(&data, [240, 200]).expect("the scene loads");
+    renderer.slices_per_frame = 1;
+    renderer.draw(&frame).expect("drawn");
+    let moved = Frame { world_from_tool: Pose::from_translation(Vec3::new(3.0, 90.0, 2.0)), ..frame };
+    let parts = renderer.layout().slices.expect("there is room");
+    let part = |image: &Image, [x, y, w, h]: [u32; 4]| -> Vec<_> {
+        (y..y + h).flat_map(|y| (x..x + w).map(move |x| (x, y))).map(|(x, y)| image.pixel(x, y)).collect()
+    };
+    let mut drawn = [0; 3];
+    for _ in 0..3 {
+        let before = renderer.image().clone();
+        renderer.draw(&moved).expect("drawn");
+        for (count, &place) in drawn.iter_mut().zip(&parts) {
+            *count += usize::from(part(&before, place) != part(renderer.image(), place));
+        }
+    }
+    assert_eq!(drawn, [1; 3]);
+    let mut all = ProcessorRenderer::new(&data, [240, 200]).expect("the scene loads");
+    all.draw(&moved).expect("drawn");
+    assert!(parts.iter().all(|&place| part(all.image(), place) == part(renderer.image(), place)));
 }
 
 #[test]

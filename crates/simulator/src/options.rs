@@ -50,6 +50,10 @@ pub struct Options {
     /// Watch the session that runs with --share NAME, with the same case
     #[arg(long, value_name = "NAME", conflicts_with_all = ["device", "share"])]
     pub watch: Option<String>,
+    /// Language of the window: en, de, or the name of a file in the folder `languages` beside the
+    /// settings
+    #[arg(long, value_name = "LANGUAGE")]
+    pub language: Option<String>,
     /// Run without a window
     #[arg(long)]
     pub headless: bool,

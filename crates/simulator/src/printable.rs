@@ -12,6 +12,12 @@ pub(crate) fn printable(text: &str) -> String {
     text.chars().map(shown).collect()
 }
 
+/// Begins a text with a large letter.
+pub(crate) fn capital(text: impl AsRef<str>) -> String {
+    let mut letters = text.as_ref().chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

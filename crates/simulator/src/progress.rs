@@ -3,10 +3,21 @@
 use crate::error::SessionError;
 use crate::run::clock::Clock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use trepan_volume::VoxelVolume;
 
 /// A stage of loading: its name and when it began, ms since loading began.
 pub(crate) type Stage = (&'static str, f64);
+
+/// A skull that is only looked at, in coarse voxels.
+#[derive(Debug)]
+pub(crate) struct DraftSkull {
+    /// Densities, HU.
+    pub hu: VoxelVolume<i16>,
+    /// Threshold of bone, HU.
+    pub isovalue_hu: i16,
+}
 
 /// Progress of loading; clones share it.
 #[derive(Clone, Debug)]
@@ -18,12 +29,13 @@ struct Shared {
     stages: Mutex<Vec<Stage>>,
     cancelled: AtomicBool,
     running: AtomicBool,
+    draft: Mutex<Option<Sender<DraftSkull>>>,
 }
 
 impl Default for Progress {
     fn default() -> Self {
-        let (cancelled, running) = Default::default();
-        Self(Arc::new(Shared { clock: Clock::start(), stages: Mutex::default(), cancelled, running }))
+        let (cancelled, running, draft) = Default::default();
+        Self(Arc::new(Shared { clock: Clock::start(), stages: Mutex::default(), cancelled, running, draft }))
     }
 }
 
@@ -42,7 +54,30 @@ impl Progress {
     /// Ends the last stage: the session runs.
     pub fn run(&self) {
         self.lock().push((RUNNING, self.0.clock.now_ms()));
+        self.end_wait();
         self.0.running.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns where the skull can be awaited once its CT is read. It ends without one if there is
+    /// no CT, or loading ends before.
+    pub fn awaits_skull(&self) -> Receiver<DraftSkull> {
+        let (to, from) = channel();
+        *self.0.draft.lock().unwrap_or_else(PoisonError::into_inner) = Some(to);
+        from
+    }
+
+    /// Hands the skull to whoever awaits it, or ends the wait; it is made only then.
+    pub fn offer_skull(&self, skull: Option<impl FnOnce() -> DraftSkull>) {
+        let to = self.0.draft.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some((to, make)) = to.zip(skull) {
+            // Nobody may wait any more.
+            to.send(make()).ok();
+        }
+    }
+
+    /// Ends the wait for a skull: none comes any more.
+    pub fn end_wait(&self) {
+        self.offer_skull(None::<fn() -> DraftSkull>);
     }
 
     /// Whether loading is over and the session runs, or has run.
@@ -88,5 +123,20 @@ mod tests {
             other.so_far().0.iter().map(|s| s.0).collect::<Vec<_>>(),
             ["reading the CT", "meshing the brain", RUNNING]
         );
+    }
+
+    #[test]
+    fn a_skull_comes_to_whoever_awaits_it_once_and_the_end_of_loading_ends_the_wait() {
+        let progress = Progress::default();
+        let skull = || DraftSkull { hu: VoxelVolume::isotropic([1; 3], glam::Vec3::ZERO, 1.0, 7), isovalue_hu: 300 };
+        progress.offer_skull(Some(skull));
+        let first = progress.awaits_skull();
+        progress.offer_skull(Some(skull));
+        progress.offer_skull(Some(skull));
+        assert_eq!(first.recv().map(|skull| skull.hu.data).ok(), Some(vec![7]));
+        assert!(first.recv().is_err());
+        let second = progress.awaits_skull();
+        progress.run();
+        assert!(second.recv().is_err());
     }
 }

@@ -435,6 +435,7 @@ impl Session {
             asked_hz: self.setup.operation.rate_hz.into(),
             frames: album.frames,
             fps: fps(album.frames, album.seconds),
+            moving: album.moving.summary(),
             ..Summary::default()
         }
     }

@@ -8,6 +8,9 @@ use std::time::{Duration, Instant};
 use trepan_link::Recording;
 use trepan_link::wire::TickRecord;
 
+/// Pixels in a row of the display, and the colour of the main button.
+const WIDTH: usize = 1280;
+const SKY: [u8; 3] = [86, 180, 233];
 /// "End the operation" at 1280 by 800.
 const END: [u32; 2] = [1140, 775];
 
@@ -23,6 +26,7 @@ impl Person {
     /// Sits down in front of the program; `None` where the tools are missing.
     pub fn sits_down(home: &Path, settings: &str) -> Option<Self> {
         Command::new("xdotool").arg("version").output().ok()?;
+        Command::new("import").arg("-version").output().ok()?;
         let mut screen = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "1280x800x24"])
             .stdout(Stdio::piped())
@@ -61,6 +65,23 @@ impl Person {
         std::thread::sleep(Duration::from_millis(300));
         self.does("click 1");
         std::thread::sleep(Duration::from_millis(700));
+    }
+
+    /// Middle of the button of the usual next step: the first large patch in its colour, sky blue.
+    fn main_button(&self) -> Option<[u32; 2]> {
+        let args = ["-window", "root", "-depth", "8", "rgb:-"];
+        let pixels = Command::new("import").args(args).env("DISPLAY", &self.display).output().ok()?.stdout;
+        let is_sky = |x: usize, y: usize| pixels.get(3 * (y * WIDTH + x)..).is_some_and(|rgb| rgb.starts_with(&SKY));
+        let is_patch = |x: usize, y: usize| (0..6).all(|n| is_sky(x + 6 * n, y) && is_sky(x, y + n));
+        let places = (0..pixels.len() / 3).map(|at| (at % WIDTH, at / WIDTH));
+        let (x, y) = places.filter(|(x, _)| x + 40 < WIDTH).find(|(x, y)| is_patch(*x, *y))?;
+        Some([x as u32 + 20, y as u32 + 12])
+    }
+
+    /// Presses the button of the usual next step once it is there.
+    pub fn goes_on(&self) {
+        self.waits_for("the next step", || self.main_button().is_some());
+        self.clicks(self.main_button().unwrap());
     }
 
     pub fn waits_for(&self, what: &str, done: impl Fn() -> bool) {

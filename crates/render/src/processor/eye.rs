@@ -7,7 +7,7 @@ use super::{Inputs, light, overlay, rows};
 use crate::border::Border;
 use crate::bricks::NOTHING;
 use crate::camera::{SAMPLES, View};
-use crate::image::Image;
+use crate::image::{Enlarge, Image};
 use crate::overlay::Item;
 use crate::recast::Recast;
 
@@ -16,6 +16,8 @@ use crate::recast::Recast;
 pub(crate) struct Eye {
     /// Rectangle of its view in the picture.
     pub area: [u32; 4],
+    /// Width and height of the drawn view, pixels; enlarged into the rectangle.
+    pub size: [u32; 2],
     pub rays: Vec<Ray>,
     pub recast: Recast,
     /// Distance that is free of bone for each tile, mm.
@@ -30,10 +32,11 @@ pub(crate) struct Eye {
 const CHUNK: usize = 256;
 
 impl Eye {
-    pub fn of(area: [u32; 4]) -> Self {
-        let [_, _, width, height] = area.map(|n| n as usize);
+    pub fn of(area: [u32; 4], size: [u32; 2]) -> Self {
+        let [width, height] = size.map(|n| n as usize);
         Self {
             area,
+            size,
             rays: vec![Ray::NONE; width * height],
             recast: Recast::default(),
             clear: Vec::new(),
@@ -41,11 +44,6 @@ impl Eye {
             pixels: vec![[0; 4]; width * height],
             edges: None,
         }
-    }
-
-    /// Width and height of its view, pixels.
-    pub fn size(&self) -> [u32; 2] {
-        [self.area[2], self.area[3]]
     }
 
     /// Draws bone, brain, tools and overlay; returns the number of pixels cast again.
@@ -75,9 +73,9 @@ impl Eye {
 
     /// The view of the next sample of the edges.
     pub fn next_view(&mut self, view: &View) -> View {
-        let (pixels, width) = (&self.pixels, self.area[2] as usize);
+        let (pixels, width) = (&self.pixels, self.size[0] as usize);
         let taken = self.edges.get_or_insert_with(|| Edges::of(pixels, width)).taken;
-        view.sample(taken, self.size())
+        view.sample(taken, self.size)
     }
 
     /// Adds a sample of the edges, seen by their next view.
@@ -92,7 +90,7 @@ impl Eye {
     ) {
         let Some(mut edges) = self.edges.take() else { return };
         self.fragments.draw(brain, view, inputs.scene.brain_cut);
-        let [width, height] = self.size().map(|n| n as usize);
+        let [width, height] = self.size.map(|n| n as usize);
         let (bricks, scene, fragments) = (inputs.bricks, inputs.scene, &self.fragments);
         let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
         let cast_bone = show_bone && bricks.is_some();
@@ -128,7 +126,7 @@ impl Eye {
             self.recast.forget();
             return 0;
         }
-        let Some(part) = self.recast.part(view, scene.bone_cut, self.size()) else { return 0 };
+        let Some(part) = self.recast.part(view, scene.bone_cut, self.size) else { return 0 };
         let [x, y, w, h] = part.map(|n| n as usize);
         let [columns, lines] = [w, h].map(|n| n.div_ceil(TILE));
         self.clear.resize(columns * lines, 0.0);
@@ -140,8 +138,8 @@ impl Eye {
         let exact = |[at_x, at_y]: [usize; 2], around: &[Ray]| {
             cast(bricks, scene, [at_x, at_y], clears[(at_x - x) / TILE + columns * ((at_y - y) / TILE)], around)
         };
-        let width = self.area[2] as usize;
-        if bricks.casting.sparse && part[2..] == self.area[2..] {
+        let width = self.size[0] as usize;
+        if bricks.casting.sparse && part[2..] == self.size[..] {
             let between = |at, around: &[Ray]| Ray::between(scene, at, around);
             rows::sparsely(threads, &mut self.rays, width, exact, between);
         } else {
@@ -154,7 +152,7 @@ impl Eye {
 
     /// Shades every pixel.
     fn light(&mut self, inputs: &Inputs, view: &View, threads: usize) {
-        let [width, height] = self.size().map(|n| n as usize);
+        let [width, height] = self.size.map(|n| n as usize);
         let (rays, fragments, scene) = (&self.rays, &self.fragments, inputs.scene);
         let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
         let near = |at: [usize; 2]| tools.map(|tool| overlay::inside(tool, at));
@@ -179,20 +177,22 @@ impl Eye {
         });
     }
 
-    /// Copies the view into the picture; for an anaglyph, only green and blue, over the other eye's
+    /// Enlarges the view into the picture; for an anaglyph, only green and blue, over the other eye's
     /// luminance.
-    pub fn show(&self, picture: &mut Image, in_one: bool) {
+    pub fn show(&self, picture: &mut Image, in_one: bool, threads: usize) {
         let [x, y, width, height] = self.area.map(|n| n as usize);
         let wide = picture.width as usize;
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut picture.rgba);
-        let rows = rows::of(pixels, wide, y..y + height, x..x + width);
-        for ((_, row), seen) in rows.zip(self.pixels.chunks_exact(width)) {
+        let enlarge = Enlarge::of(&self.pixels, self.size, [self.area[2], self.area[3]]);
+        rows::share(threads, rows::of(pixels, wide, y..y + height, x..x + width), |at, row| {
             if in_one {
-                row.iter_mut().zip(seen).for_each(|(pixel, &seen)| *pixel = anaglyph(*pixel, seen));
+                let mut seen = vec![[0; 4]; width];
+                enlarge.row(at - y, &mut seen);
+                row.iter_mut().zip(seen).for_each(|(pixel, seen)| *pixel = anaglyph(*pixel, seen));
             } else {
-                row.copy_from_slice(seen);
+                enlarge.row(at - y, row);
             }
-        }
+        });
     }
 }
 

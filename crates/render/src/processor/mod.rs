@@ -43,7 +43,7 @@ use crate::layout::Layout;
 use crate::mri::Signals;
 use crate::overlay::items;
 use crate::paint::Paint;
-use crate::report::{BRICKS_PER_FRAME, DrawReport, Hit, eye_view};
+use crate::report::{BRICKS_PER_FRAME, DrawReport, Hit, LEAST_DETAIL, eye_view};
 use crate::scene::Scene;
 use crate::slice::Plane;
 use crate::stereo::StereoLook;
@@ -67,8 +67,16 @@ pub struct ProcessorRenderer {
     stereo: Option<StereoLook>,
     /// One eye, or the left and the right.
     eyes: Vec<Eye>,
+    /// Fraction of the 3-D view's pixels along an edge.
+    detail: f32,
+    /// The next slice to be drawn.
+    turn: usize,
+    /// Whether no slice was drawn yet in this size.
+    fresh: bool,
     /// Most changed bricks processed per picture; the rest follows in the next pictures.
     pub bricks_per_frame: usize,
+    /// Slices drawn per picture, in turn; the others stay as they are. All three by default.
+    pub slices_per_frame: usize,
     /// Threads that share the rows of a picture; by default one per processor.
     pub threads: usize,
 }
@@ -100,7 +108,11 @@ impl ProcessorRenderer {
             picture: Image { width: 0, height: 0, rgba: Vec::new() },
             stereo: None,
             eyes: Vec::new(),
+            detail: 1.0,
+            turn: 0,
+            fresh: true,
             bricks_per_frame: BRICKS_PER_FRAME,
+            slices_per_frame: 3,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
         };
         renderer.divide(size, true, None)?;
@@ -110,6 +122,13 @@ impl ProcessorRenderer {
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         self.divide(size, self.layout.slices.is_some(), self.stereo)
+    }
+
+    /// Draws the 3-D view with a fraction of the pixels along an edge, from 0.05 to 1, and enlarges
+    /// it. Slices keep all their pixels.
+    pub fn set_detail(&mut self, share: f32) -> Result<(), RenderError> {
+        self.detail = if share.is_finite() { share.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
+        self.resize(self.size())
     }
 
     fn divide(
@@ -126,11 +145,13 @@ impl ProcessorRenderer {
             self.layout = layout;
             self.picture = Image { width, height, rgba: vec![0; 4 * width as usize * height as usize] };
             self.eyes.clear();
+            self.fresh = true;
         }
         self.stereo = stereo;
         let areas = StereoLook::areas(stereo, layout.view);
-        if !self.eyes.iter().map(|eye| eye.area).eq(areas.iter().copied()) {
-            self.eyes = areas.into_iter().map(Eye::of).collect();
+        let drawn = |area: &[u32; 4]| [area[2], area[3]].map(|n| ((n as f32 * self.detail).round() as u32).clamp(1, n));
+        if !self.eyes.iter().map(|eye| (eye.area, eye.size)).eq(areas.iter().map(|area| (*area, drawn(area)))) {
+            self.eyes = areas.iter().map(|area| Eye::of(*area, drawn(area))).collect();
         }
         Ok(())
     }
@@ -150,13 +171,13 @@ impl ProcessorRenderer {
         let mut eyes = std::mem::take(&mut self.eyes);
         for (n, eye) in eyes.iter_mut().enumerate() {
             let view = eye_view(frame, eye.area, n);
-            let scene = Scene::of(frame, &view, eye.size(), &self.bricks.grid, mri_from_world);
+            let scene = Scene::of(frame, &view, eye.size, &self.bricks.grid, mri_from_world);
             eye.recast.note(followed.changed);
             let inputs = self.inputs(frame, &scene);
             let brain = self.brain.as_ref().filter(|_| frame.show_brain);
             pixels_cast += eye.draw(&inputs, brain, frame.show_bone, &view, &items, self.threads);
             let in_one = n > 0 && frame.stereo.is_some_and(|s| s.look == StereoLook::Anaglyph);
-            eye.show(&mut self.picture, in_one);
+            eye.show(&mut self.picture, in_one, self.threads);
             if n == 0 {
                 self.slices(frame, &scene);
             }
@@ -173,11 +194,11 @@ impl ProcessorRenderer {
             [eye] if !eye.is_smooth() => {
                 let view = eye.next_view(&eye_view(frame, eye.area, 0));
                 let mri_from_world = self.mri.as_ref().map(|m| m.texture_from_world);
-                let scene = Scene::of(frame, &view, eye.size(), &self.bricks.grid, mri_from_world);
+                let scene = Scene::of(frame, &view, eye.size, &self.bricks.grid, mri_from_world);
                 let (items, _) = items(&frame.overlay, view.eye);
                 let brain = self.brain.as_ref().filter(|_| frame.show_brain);
                 eye.refine(&self.inputs(frame, &scene), brain, frame.show_bone, &view, &items, self.threads);
-                eye.show(&mut self.picture, false);
+                eye.show(&mut self.picture, false, self.threads);
                 true
             }
             _ => false,
@@ -204,7 +225,11 @@ impl ProcessorRenderer {
         let (bricks, mri, width) = (&self.bricks, self.mri.as_ref(), self.picture.width as usize);
         let inputs = Inputs { scene, bricks, mri, bone_paint: None, brain_paint: None };
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut self.picture.rgba);
-        for (n, (plane, rectangle)) in planes.iter().zip(&rectangles).enumerate() {
+        let first = self.turn;
+        self.turn = (first + self.slices_per_frame) % 3;
+        let count = if std::mem::take(&mut self.fresh) { 3 } else { self.slices_per_frame.min(3) };
+        for n in (first..first + count).map(|n| n % 3) {
+            let (plane, rectangle) = (&planes[n], &rectangles[n]);
             let [x, y, w, h] = rectangle.map(|n| n as usize);
             let places = self.brain.as_ref().map_or_else(Vec::new, |brain| section::places([w, h], plane, brain));
             let rows = rows::of(pixels, width, y..y + h, x..x + w);

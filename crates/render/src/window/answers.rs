@@ -54,6 +54,7 @@ pub(crate) fn refusal(command: Command, panel: &Panel, look: &Look) -> Option<St
         Command::NextTool | Command::Withdraw => led(),
         Command::Undo => led().or_else(|| panel.no_undo.clone()),
         Command::Redo => led().or_else(|| panel.no_redo.clone()),
+        Command::Apart if !look.slices.shown => Some("the slices are switched off".into()),
         Command::Microscope if !look.has_microscope() => Some("this view has no microscope".into()),
         _ => None,
     }
@@ -68,6 +69,7 @@ pub(crate) fn done(command: Command, name: &str, look: &Look, large: bool) -> St
         Command::Bone => on(look.bone),
         Command::Brain => on(look.brain),
         Command::Slices => on(look.slices.shown),
+        Command::Apart => on(look.apart),
         Command::Hints => on(look.hints),
         Command::Section => on(look.section.is_some()),
         Command::Stereo => on(look.stereo.is_some()),
@@ -90,7 +92,7 @@ pub(crate) fn unused_key(input: &egui::InputState, panel: &Panel) -> Option<Stri
             (Key::Space, _) => panel.no_drill.clone(),
             (Key::OpenBracket | Key::CloseBracket, _) => (!replays).then(|| "events are in a replay only".into()),
             _ => number(key, panel).unwrap_or_else(|| {
-                Some(format!("the key {} has no use here: F1 shows all keys", key.symbol_or_name()))
+                Some(format!("this key has no use here: {}; F1 shows all keys", key.symbol_or_name()))
             }),
         }
     };
@@ -104,8 +106,8 @@ fn number(key: Key, panel: &Panel) -> Option<Option<String>> {
     Some(match choice.and_then(|choice| choice.options.get(slot).map(|option| (choice, option))) {
         _ if !panel.by_hand => Some(NOBODY.into()),
         None => Some(format!("there is no tool number {}", slot + 1)),
-        Some((choice, (name, _))) if choice.chosen == slot => Some(format!("the {name} is in the hand")),
-        Some((_, (name, false))) => Some(format!("the {name} cannot be taken now")),
+        Some((choice, (name, _))) if choice.chosen == slot => Some(format!("it is in the hand: {name}")),
+        Some((_, (name, Some(why)))) => Some(format!("{name}: {why}")),
         Some(_) => None,
     })
 }

@@ -9,21 +9,14 @@ use super::look::Look;
 use super::panel::{self, Clicks, Traces};
 use super::pointer::Pointer;
 use super::quality::{Quality, Step};
+use super::screen::{Area, Screen};
 use super::surface::{Ray, Surfaces};
-use super::{Draws, Lent, Panel, Playback, Refined, Session, Shared, Start, WindowInput, aids, banner, timeline};
-use crate::{Frame, Image, RenderError, View};
+use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, timeline};
+use crate::View;
+use eframe::egui;
 use eframe::egui_wgpu::RenderState;
-use eframe::{egui, wgpu};
 use glam::Vec3;
 use std::time::{Duration, Instant};
-
-/// How the picture gets into the window.
-enum Screen {
-    /// The renderer's own texture is shown.
-    Shares(Option<(egui::TextureId, wgpu::TextureView)>),
-    /// Every picture is copied into one of the window's textures.
-    Copies(Option<egui::TextureHandle>),
-}
 
 /// First and least width of the side panel, points; at most half of the window.
 const PANEL_WIDTH: f32 = 270.0;
@@ -53,8 +46,8 @@ pub(super) struct Window<S, D> {
     audio: super::loudspeaker::AudioOutput,
     screen: Screen,
     quality: Quality,
-    /// The last picture: its view and texture.
-    last: Option<(View, egui::TextureId)>,
+    /// The view of the last picture.
+    last: Option<View>,
     /// Time of the last picture, s.
     pub(super) drawn_at: f64,
     /// Time from the picture before to that, s.
@@ -81,7 +74,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             playback: None,
             #[cfg(feature = "sound")]
             audio: Default::default(),
-            screen: if copies { Screen::Copies(None) } else { Screen::Shares(None) },
+            screen: Screen::new(copies),
             quality: Quality::new(!hardware, start.detail),
             last: None,
             drawn_at: 0.0,
@@ -193,6 +186,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             playback: self.playback,
             camera: self.hand.camera,
             seconds: i.time,
+            pace: self.quality.pace,
         });
         self.panel = shared.session.update(&input);
         self.hand.turn_view(&self.panel.knob, 1e3 * self.dt_s);
@@ -208,7 +202,7 @@ impl<S: Session, D: Draws> Window<S, D> {
     fn numbered(&self, input: &egui::InputState) -> Option<[usize; 2]> {
         let slot = answers::NUMBERS.iter().position(|key| input.key_pressed(*key))?;
         let choice = self.panel.choices.first().filter(|choice| !choice.tools.is_empty())?;
-        let open = choice.options.get(slot).is_some_and(|(_, open)| *open) && choice.chosen != slot;
+        let open = choice.options.get(slot).is_some_and(|(_, why_not)| why_not.is_none()) && choice.chosen != slot;
         open.then_some([0, slot])
     }
 
@@ -222,33 +216,56 @@ impl<S: Session, D: Draws> Window<S, D> {
         let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
         let frame = self.look.on(shared.session.frame(self.hand.camera));
+        let parts = Area::of(pixels, self.look.apart && frame.slices.shown);
         let stale = shared.renderer.is_stale();
-        let (step, began) = (self.quality.step(&frame, pixels, stale, now), Instant::now());
+        let (step, began) = (self.quality.step(&frame, parts.size, stale, now), Instant::now());
         let shown = match (step, self.last) {
             (Step::Keep, Some(last)) => Ok(last),
             (Step::Refine, Some(last)) => {
-                if !self.screen.refine(&mut shared.renderer, &frame) {
+                if !self.screen.refine(state, &mut shared.renderer, &frame) {
                     self.quality.complete();
                 }
                 Ok(last)
             }
-            (Step::Draw(detail), _) => self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, detail),
-            _ => self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, 1.0),
+            (Step::Draw(detail), _) => self.screen.draw(ui, state, &mut shared.renderer, &frame, &parts, detail),
+            _ => self.screen.draw(ui, state, &mut shared.renderer, &frame, &parts, 1.0),
         };
         self.quality.note(began.elapsed().as_secs_f64(), now);
         match shown {
             Err(error) => shared.fault = Some(error.to_string()),
-            Ok((view, id)) => {
-                self.last = Some((view, id));
-                let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-                ui.painter().image(id, area, whole, egui::Color32::WHITE);
+            Ok(view) => {
+                self.last = Some(view);
+                self.screen.paint(ui, area, 0);
+                parts.slices_aspect().into_iter().for_each(|aspect| self.slices(ui, aspect));
                 self.lead(ui, &response, &view, &shared.session);
                 let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
                 let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
-                ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, self.quality.text(), font, grey);
+                ui.painter().text(
+                    corner,
+                    egui::Align2::LEFT_BOTTOM,
+                    super::words::tr(&self.quality.text()),
+                    font,
+                    grey,
+                );
                 shared.shown = true;
             }
         }
+    }
+
+    /// Shows the slices in a window of their own, for another screen.
+    fn slices(&mut self, ui: &egui::Ui, aspect: f32) {
+        let id = egui::ViewportId::from_hash_of("slices");
+        let window = egui::ViewportBuilder::default()
+            .with_title(super::words::tr("Slices"))
+            .with_inner_size([900.0 * aspect, 900.0]);
+        let (screen, apart) = (&self.screen, &mut self.look.apart);
+        ui.ctx().show_viewport_immediate(id, window, |ui, _| {
+            let space = ui.max_rect();
+            let size =
+                egui::vec2(space.width().min(space.height() * aspect), space.height().min(space.width() / aspect));
+            screen.paint(ui, egui::Rect::from_center_size(space.center(), size), 1);
+            *apart &= !ui.input(|input| input.viewport().close_requested());
+        });
     }
 
     /// Moves view and tool by pointer and keys, and draws where the tool will land.
@@ -280,86 +297,6 @@ impl<S: Session, D: Draws> Window<S, D> {
         }
         aids::show(ui, response.rect, &around, &self.panel, self.hand.guide.is_pressed());
     }
-}
-
-/// Why a frame is not shown.
-#[derive(Debug, thiserror::Error)]
-enum ShowError {
-    /// The window was opened without a graphics device.
-    #[error("the window has no graphics device")]
-    NoDevice,
-    /// Rendering failed.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-}
-
-impl Screen {
-    /// Smooths the edges of the last picture by one more sample; returns whether there was one to
-    /// add.
-    fn refine(&mut self, renderer: &mut impl Draws, frame: &Frame<'_>) -> bool {
-        // A lost device is met by the next picture.
-        match (renderer.refine(frame, matches!(self, Self::Copies(_))), self) {
-            (Ok(Refined::Copied(image)), Self::Copies(Some(copy))) => {
-                copy.set(colours(&image), egui::TextureOptions::LINEAR);
-                true
-            }
-            (refined, _) => matches!(refined, Ok(Refined::Drawn)),
-        }
-    }
-
-    /// Draws a frame and returns the window's texture of it.
-    fn show(
-        &mut self,
-        ui: &egui::Ui,
-        state: Option<&RenderState>,
-        renderer: &mut impl Draws,
-        frame: &Frame<'_>,
-        pixels: [u32; 2],
-        detail: f32,
-    ) -> Result<(View, egui::TextureId), ShowError> {
-        let texture = match self {
-            Self::Shares(texture) => texture,
-            Self::Copies(copy) => {
-                let (view, image) = renderer.picture(frame, pixels, detail)?;
-                let linear = egui::TextureOptions::LINEAR;
-                let copy =
-                    copy.get_or_insert_with(|| ui.ctx().load_texture("picture", egui::ColorImage::default(), linear));
-                copy.set(colours(&image), linear);
-                return Ok((view, copy.id()));
-            }
-        };
-        let state = state.ok_or(ShowError::NoDevice)?;
-        let view = renderer.draw(frame, pixels, detail)?;
-        if let Some(drawn) = renderer.texture() {
-            return Ok((view, registered(texture, state, drawn.view())));
-        }
-        // The processor has taken over: its pictures are copied from now on.
-        *self = Self::Copies(None);
-        self.show(ui, Some(state), renderer, frame, pixels, detail)
-    }
-}
-
-/// A picture as egui takes it.
-fn colours(image: &Image) -> egui::ColorImage {
-    // It is opaque, so that nothing is to be multiplied.
-    egui::ColorImage::from_rgba_premultiplied([image.width as usize, image.height as usize], &image.rgba)
-}
-
-/// Registers the renderer's texture, again when it changed.
-fn registered(
-    texture: &mut Option<(egui::TextureId, wgpu::TextureView)>,
-    state: &RenderState,
-    view: &wgpu::TextureView,
-) -> egui::TextureId {
-    if let Some((id, shown)) = texture {
-        if shown == view {
-            return *id;
-        }
-        state.renderer.write().free_texture(id);
-    }
-    let id = state.renderer.write().register_native_texture(&state.device, view, wgpu::FilterMode::Linear);
-    *texture = Some((id, view.clone()));
-    id
 }
 
 impl<S: Session, D: Draws> eframe::App for Window<S, D> {

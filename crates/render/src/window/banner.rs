@@ -9,6 +9,7 @@
 
 use super::Panel;
 use super::palette::{PALE as GREY, SKY, VERMILION};
+use super::words::tr;
 use eframe::egui::{self, Color32, Rect, RichText};
 
 /// Shows the most urgent warning, the news and an answer to the user over an area of the window.
@@ -21,11 +22,11 @@ pub(crate) fn show(ui: &egui::Ui, over: Rect, panel: &Panel, answer: Option<&str
     area.show(ui.ctx(), |ui| {
         ui.set_width(over.width());
         ui.spacing_mut().item_spacing.y = 0.0;
-        strip(ui, "WARNING   ", 24.0, VERMILION, &panel.warnings[..panel.warnings.len().min(1)]);
+        strip(ui, "WARNING", 24.0, VERMILION, &panel.warnings[..panel.warnings.len().min(1)]);
         strip(ui, "", 18.0, SKY, &panel.news);
         strip(ui, "", 16.0, GREY, answer.map(String::from).as_slice());
     });
-    let notes = panel.technical.join("; ");
+    let notes = panel.technical.iter().map(|note| tr(note)).collect::<Vec<_>>().join("; ");
     if !notes.is_empty() {
         let (at, font) = (over.left_bottom() + egui::vec2(8.0, -6.0), egui::FontId::proportional(13.0));
         let galley = ui.painter().layout(notes, font, GREY, over.width() - 16.0);
@@ -39,10 +40,11 @@ fn strip(ui: &mut egui::Ui, word: &str, size: f32, colour: Color32, lines: &[Str
     if lines.is_empty() {
         return;
     }
+    let text = |line: &String| if word.is_empty() { tr(line) } else { format!("{}   {}", tr(word), tr(line)) };
     egui::Frame::new().fill(colour).inner_margin(10.0).show(ui, |ui| {
         ui.set_width(ui.available_width());
         for line in lines {
-            ui.label(RichText::new(format!("{word}{line}")).size(size).strong().color(Color32::BLACK));
+            ui.label(RichText::new(text(line)).size(size).strong().color(Color32::BLACK));
         }
     });
 }

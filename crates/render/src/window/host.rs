@@ -147,8 +147,8 @@ struct Open<H> {
     guest: Option<Guest>,
 }
 
-/// Application of a window with pages and sessions.
-struct Pages<H> {
+/// Application of a window with pages and sessions, as [`open`] runs it.
+pub struct Pages<H> {
     open: Rc<RefCell<Open<H>>>,
     device: Option<Gpu>,
     textures: Textures,
@@ -180,6 +180,22 @@ pub fn open<H: Host + 'static>(
 }
 
 impl<H: Host> Pages<H> {
+    /// An application that is drawn without a window of its own, with copied pictures.
+    pub fn undisplayed(offers: Offers, host: H) -> Self {
+        let open = Rc::new(RefCell::new(Open { host, offers: offers.0, guest: None }));
+        Self { open, device: None, textures: Textures::default() }
+    }
+
+    /// Draws one picture of it.
+    pub fn draw(&mut self, ui: &mut egui::Ui) {
+        self.show(ui, None);
+    }
+
+    /// Hands the host to a function.
+    pub fn with_host<T>(&self, does: impl FnOnce(&mut H) -> T) -> T {
+        does(&mut self.open.borrow_mut().host)
+    }
+
     fn show(&mut self, ui: &mut egui::Ui, state: Option<&RenderState>) {
         let open = self.open.clone();
         let Open { host, offers, guest } = &mut *open.borrow_mut();
@@ -204,7 +220,7 @@ impl<H: Host> Pages<H> {
             Shown::Session(strip) => {
                 let strip = strip.map(|page| {
                     let panel = egui::Panel::top("strip").resizable(false).max_size(260.0);
-                    panel.show(ui, |ui| page::show(ui, &page, &mut self.textures)).inner
+                    panel.show(ui, |ui| page::strip(ui, &page, &mut self.textures)).inner
                 });
                 *ui.visuals_mut() = theme;
                 if let Some(mut shown) = guest.take() {
@@ -235,7 +251,7 @@ fn landing(context: &egui::Context, text: &str) {
     let frame = area.shrink(24.0);
     painter.rect_stroke(frame, 12.0, egui::Stroke::new(4.0, SKY), egui::StrokeKind::Inside);
     let font = egui::FontId::proportional(26.0);
-    let galley = painter.layout(text.into(), font, egui::Color32::WHITE, frame.width() - 40.0);
+    let galley = painter.layout(super::tr(text), font, egui::Color32::WHITE, frame.width() - 40.0);
     painter.galley(frame.center() - 0.5 * galley.size(), galley, egui::Color32::WHITE);
 }
 

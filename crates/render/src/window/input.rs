@@ -32,6 +32,17 @@ pub struct WindowInput {
     pub camera: Camera,
     /// Time since the window opened, s.
     pub seconds: f64,
+    /// The last picture, if something moved in it and in the one before.
+    pub pace: Option<Pace>,
+}
+
+/// What a picture cost while something moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Time since the picture before, s.
+    pub interval_s: f64,
+    /// Fraction of the 3-D view's pixels along an edge.
+    pub detail: f32,
 }
 
 /// Camera rotation for a drag, rad per point.

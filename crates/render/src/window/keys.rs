@@ -2,6 +2,7 @@
 
 use super::Action;
 use super::palette::SKY;
+use super::words::tr;
 use eframe::egui::{self, Key, RichText};
 
 /// A command of the user to the window.
@@ -24,6 +25,7 @@ pub(crate) enum Command {
     Bone,
     Brain,
     Slices,
+    Apart,
     Hints,
     Section,
     Stereo,
@@ -53,6 +55,7 @@ pub(crate) const KEYS: &[(Key, Command, &str)] = &[
     (Key::B, Command::Bone, "Skull"),
     (Key::T, Command::Brain, "Brain"),
     (Key::S, Command::Slices, "Slices"),
+    (Key::W, Command::Apart, "Slices in their own window"),
     (Key::O, Command::Hints, "Colours and arrows"),
     (Key::C, Command::Section, "Section"),
     (Key::E, Command::Stereo, "Stereo"),
@@ -83,6 +86,9 @@ const REST: [(&str, &str); 10] = [
     ("[ and ]", "In a replay: to the event before and after"),
 ];
 
+/// Largest width of the page of keys, points.
+const WIDEST: f32 = 640.0;
+
 /// The commands whose keys were pressed.
 pub(crate) fn pressed(input: &egui::InputState) -> impl Iterator<Item = Command> {
     KEYS.iter().filter(|(key, ..)| input.key_pressed(*key)).map(|(_, command, _)| *command)
@@ -96,7 +102,7 @@ pub(crate) fn name(command: Command) -> &'static str {
 /// Button label of a command with its key.
 pub(crate) fn label(command: Command) -> String {
     let found = KEYS.iter().find(|(_, c, _)| *c == command);
-    found.map_or_else(String::new, |(key, _, words)| format!("{words} ({})", key.symbol_or_name()))
+    found.map_or_else(String::new, |(key, _, words)| format!("{} ({})", tr(words), tr(key.symbol_or_name())))
 }
 
 /// The key of a session's own action.
@@ -106,14 +112,18 @@ pub(crate) fn of_action(action: &Action) -> Option<Key> {
 
 /// The help page over the picture.
 pub(crate) fn help(context: &egui::Context, actions: &[Action]) {
-    let centre = egui::Align2::CENTER_CENTER;
-    let page = egui::Window::new("Keys and mouse").collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);
-    page.show(context, |ui| {
-        egui::ScrollArea::vertical().show(ui, |ui| {
-            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+    let (centre, screen) = (egui::Align2::CENTER_CENTER, context.content_rect());
+    let page = egui::Window::new(tr("Keys and mouse")).collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);
+    let width = (screen.width() - 60.0).min(WIDEST);
+    page.max_width(width).show(context, |ui| {
+        egui::ScrollArea::vertical().min_scrolled_height(screen.height() - 90.0).show(ui, |ui| {
+            egui::Grid::new("keys").num_columns(2).striped(true).min_col_width(0.3 * width).show(ui, |ui| {
                 let mut row = |key: &str, words: &str| {
-                    ui.label(RichText::new(key).monospace().color(SKY));
-                    ui.label(words);
+                    let column = |ui: &mut egui::Ui, share: f32, text: RichText| {
+                        ui.scope(|ui| (ui.set_max_width(share * width), ui.add(egui::Label::new(text).wrap())));
+                    };
+                    column(ui, 0.3, RichText::new(tr(key)).color(SKY));
+                    column(ui, 0.62, RichText::new(tr(words)));
                     ui.end_row();
                 };
                 REST.iter().for_each(|(key, words)| row(key, words));

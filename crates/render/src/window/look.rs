@@ -1,6 +1,7 @@
 //! View settings: the visible parts of the scene and the camera.
 
 use super::keys::{Command, label};
+use super::words::tr;
 use crate::{Camera, Cut, Frame, Overlay, SliceLook, Stereo, StereoLook};
 use eframe::egui;
 use glam::Vec3;
@@ -17,6 +18,8 @@ pub(crate) struct Look {
     pub slices: SliceLook,
     /// Whether the slices show the whole head instead of the tool's surroundings.
     pub whole: bool,
+    /// Whether the slices have a window of their own.
+    pub apart: bool,
     /// The inactive camera: the microscope's or the orbiting one.
     other: Option<Camera>,
     microscope: bool,
@@ -59,11 +62,11 @@ impl Section {
     fn show(&mut self, ui: &mut egui::Ui) {
         ui.horizontal_wrapped(|ui| {
             for (at, (name, _)) in ACROSS.iter().enumerate() {
-                ui.selectable_value(&mut self.across, at, *name);
+                ui.selectable_value(&mut self.across, at, tr(name));
             }
         });
-        ui.add(egui::Slider::new(&mut self.offset_mm, -60.0..=60.0).step_by(0.5).text("from the tip, mm"));
-        ui.checkbox(&mut self.bone, "through the skull too");
+        ui.add(egui::Slider::new(&mut self.offset_mm, -60.0..=60.0).step_by(0.5).text(tr("from the tip, mm")));
+        ui.checkbox(&mut self.bone, tr("through the skull too"));
     }
 }
 
@@ -78,6 +81,7 @@ impl Look {
             stereo: None,
             slices: SliceLook::default(),
             whole: false,
+            apart: false,
             other: microscope,
             microscope: false,
         }
@@ -107,6 +111,7 @@ impl Look {
             Command::Bone => self.bone ^= true,
             Command::Brain => self.brain ^= true,
             Command::Slices => self.slices.shown ^= true,
+            Command::Apart => self.apart ^= true,
             Command::Hints => self.hints ^= true,
             Command::Section => self.section = if self.section.is_some() { None } else { Some(Section::FIRST) },
             Command::Stereo => {
@@ -157,7 +162,7 @@ impl Look {
     pub fn show(&mut self, ui: &mut egui::Ui, camera: &mut Camera) {
         ui.horizontal_wrapped(|ui| {
             for command in [Command::Front, Command::Back, Command::Left, Command::Right, Command::Top] {
-                if ui.button(label(command)).on_hover_text("looks from this side of the patient").clicked() {
+                if ui.button(label(command)).on_hover_text(tr("looks from this side of the patient")).clicked() {
                     self.react(command, camera);
                 }
             }
@@ -166,6 +171,7 @@ impl Look {
             ui.checkbox(&mut self.bone, label(Command::Bone));
             ui.checkbox(&mut self.brain, label(Command::Brain));
             ui.checkbox(&mut self.slices.shown, label(Command::Slices));
+            ui.add_enabled(self.slices.shown, egui::Checkbox::new(&mut self.apart, label(Command::Apart)));
             ui.checkbox(&mut self.hints, label(Command::Hints));
         });
         let mut microscope = self.microscope;
@@ -181,7 +187,7 @@ impl Look {
                 ("red-cyan", Some(StereoLook::Anaglyph)),
             ];
             for (name, look) in ways {
-                ui.selectable_value(&mut self.stereo, look, name);
+                ui.selectable_value(&mut self.stereo, look, tr(name));
             }
         });
         let mut cuts = self.section.is_some();
@@ -196,10 +202,10 @@ impl Look {
 
     fn grey_values(&mut self, ui: &mut egui::Ui) {
         let SliceLook { level_hu, width_hu, mri_share, .. } = &mut self.slices;
-        ui.checkbox(&mut self.whole, "Slices of the whole head");
-        ui.add(egui::Slider::new(level_hu, -1000.0..=2000.0).step_by(10.0).text("level, HU"));
-        ui.add(egui::Slider::new(width_hu, 50.0..=4000.0).step_by(10.0).text("window, HU"));
-        ui.add(egui::Slider::new(mri_share, 0.0..=1.0).fixed_decimals(2).text("MRI over CT"));
+        ui.checkbox(&mut self.whole, tr("Slices of the whole head"));
+        ui.add(egui::Slider::new(level_hu, -1000.0..=2000.0).step_by(10.0).text(tr("level, HU")));
+        ui.add(egui::Slider::new(width_hu, 50.0..=4000.0).step_by(10.0).text(tr("window, HU")));
+        ui.add(egui::Slider::new(mri_share, 0.0..=1.0).fixed_decimals(2).text(tr("MRI over CT")));
     }
 }
 

@@ -52,6 +52,9 @@ mod panel_text;
 mod plot;
 mod pointer;
 mod quality;
+mod screen;
+#[cfg(test)]
+mod spoken;
 mod surface;
 #[cfg(any(feature = "sound", test))]
 mod synthesis;
@@ -59,14 +62,16 @@ mod synthesis;
 mod tests;
 mod timeline;
 mod tool_icon;
+mod words;
 
 pub use capture::Capture;
 pub use draws::{Draws, Refined};
-pub use host::{Host, Offers, Shown, Stage, open, stage};
-pub use input::WindowInput;
+pub use host::{Host, Offers, Pages, Shown, Stage, open, stage};
+pub use input::{Pace, WindowInput};
 pub use page::{Amount, Button, Choosable, Drag, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};
+pub use words::{Language, missing, speak, tr};
 
 use crate::{Camera, Frame, Image, Renderer};
 use std::any::Any;

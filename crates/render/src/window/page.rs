@@ -9,6 +9,7 @@
 //! For a running session: its picture and panel are a [`Session`](super::Session).
 
 use super::palette::{GREEN, ORANGE, PALE, SKY, VERMILION};
+use super::words::tr;
 use crate::Image;
 use eframe::egui::{self, Color32, RichText};
 use std::sync::Arc;
@@ -26,11 +27,14 @@ pub struct Page<A> {
     pub foot: Vec<Item<A>>,
     /// The action of Escape, if it does something.
     pub escape: Option<A>,
+    /// Whether it fills the window, so that nothing moves when its length changes.
+    pub steady: bool,
 }
 
 impl<A> Default for Page<A> {
     fn default() -> Self {
-        Self { title: String::new(), line: String::new(), columns: Vec::new(), foot: Vec::new(), escape: None }
+        let (title, line, steady) = Default::default();
+        Self { title, line, columns: Vec::new(), foot: Vec::new(), escape: None, steady }
     }
 }
 
@@ -80,6 +84,8 @@ pub struct Button<A> {
     pub main: bool,
     /// Its action; `None` where it cannot be used.
     pub does: Option<A>,
+    /// Whether the label is the name of something, the same in every language.
+    pub is_name: bool,
 }
 
 /// An option of a choice.
@@ -141,17 +147,22 @@ pub struct Drag {
 impl<A> Item<A> {
     /// A button that can be used.
     pub fn button(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
-        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does) })
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does), is_name: false })
+    }
+
+    /// A button with the name of a file or a case, which is shown as it is.
+    pub fn named(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: false, does: Some(does), is_name: true })
     }
 
     /// The button of the usual next step.
     pub fn main(name: impl Into<String>, hint: impl Into<String>, does: A) -> Self {
-        Self::Button(Button { name: name.into(), hint: hint.into(), main: true, does: Some(does) })
+        Self::Button(Button { name: name.into(), hint: hint.into(), main: true, does: Some(does), is_name: false })
     }
 
     /// A button that cannot be used now, and why.
     pub fn closed(name: impl Into<String>, why: impl Into<String>) -> Self {
-        Self::Button(Button { name: name.into(), hint: why.into(), main: false, does: None })
+        Self::Button(Button { name: name.into(), hint: why.into(), main: false, does: None, is_name: false })
     }
 }
 
@@ -159,8 +170,15 @@ impl<A> Item<A> {
 const INK: Color32 = Color32::from_gray(225);
 /// Width of a column below which columns stand below each other, points.
 const NARROW: f32 = 300.0;
-/// Largest width of the page, points.
-const WIDEST: f32 = 1280.0;
+/// Largest width of a page of one, two and three columns, points.
+const WIDEST: [f32; 3] = [760.0, 1180.0, 1280.0];
+/// Share of the free height that stands above a page.
+const ABOVE: f32 = 0.35;
+/// Space around parts, and between columns, points.
+const GAP: f32 = 8.0;
+const BETWEEN: f32 = 28.0;
+/// Least width of a picture beside others, points.
+const PICTURE_LEAST: f32 = 120.0;
 
 /// Pictures of pages as textures of the window.
 #[derive(Default)]
@@ -183,44 +201,83 @@ impl Textures {
     }
 }
 
-/// Draws a page over the whole area; returns the actions of what was pressed.
+/// Draws a page in the middle of the whole area; returns the actions of what was pressed.
 pub(crate) fn show<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures) -> Vec<A> {
-    let mut done = Vec::new();
-    if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
-        done.extend(page.escape.clone());
-    }
-    ui.add_space(10.0);
-    ui.label(RichText::new(&page.title).size(26.0).strong());
-    if !page.line.is_empty() {
-        ui.label(RichText::new(&page.line).size(15.0).color(PALE));
-    }
-    ui.separator();
-    if !page.foot.is_empty() {
-        egui::Panel::bottom("foot").resizable(false).show(ui, |ui| {
-            ui.add_space(8.0);
-            ui.horizontal_wrapped(|ui| page.foot.iter().for_each(|item| draw(ui, item, textures, &mut done)));
-            ui.add_space(8.0);
-        });
-    }
-    egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-        columns(ui, page, textures, &mut done);
-        ui.add_space(12.0);
+    let area = ui.available_rect_before_wrap();
+    let widest = WIDEST[page.columns.len().clamp(1, WIDEST.len()) - 1];
+    let middle = area.shrink2(egui::vec2((0.5 * (area.width() - widest)).max(0.0), 0.0));
+    // Its height is known from the picture before.
+    let key = egui::Id::unique(("page", &page.title));
+    let spare = area.height() - ui.data(|data| data.get_temp::<f32>(key)).unwrap_or(area.height());
+    let floats = spare > 0.0 && !page.steady;
+    let drawn = ui.scope_builder(egui::UiBuilder::new().max_rect(middle), |ui| {
+        if floats {
+            ui.add_space(ABOVE * spare);
+        }
+        parts(ui, page, textures, floats)
     });
+    let (done, height) = drawn.inner;
+    if ui.data(|data| data.get_temp(key)) != Some(height) {
+        ui.data_mut(|data| data.insert_temp(key, height));
+        ui.request_repaint();
+    }
     done
 }
 
+/// Draws a page as a strip that is no higher than its content.
+pub(crate) fn strip<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures) -> Vec<A> {
+    parts(ui, page, textures, true).0
+}
+
+/// Draws head, columns and foot; returns the actions and the height of all. The foot follows the
+/// columns where they float, else it keeps its place at the bottom.
+fn parts<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures, floats: bool) -> (Vec<A>, f32) {
+    let (mut done, top) = (Vec::new(), ui.cursor().top());
+    ui.spacing_mut().item_spacing.y = 5.0;
+    if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
+        done.extend(page.escape.clone());
+    }
+    ui.label(RichText::new(tr(&page.title)).size(26.0).strong());
+    if !page.line.is_empty() {
+        ui.label(RichText::new(tr(&page.line)).size(15.0).color(PALE));
+    }
+    ui.separator();
+    let mut height = ui.cursor().top() - top + GAP;
+    if !floats && !page.foot.is_empty() {
+        let panel = egui::Panel::bottom("foot").resizable(false).frame(egui::Frame::NONE);
+        height += panel.show(ui, |ui| foot(ui, page, textures, &mut done)).inner;
+    }
+    let scroll = egui::ScrollArea::vertical().auto_shrink([false, floats]);
+    let content = scroll.show(ui, |ui| columns(ui, page, textures, &mut done)).content_size;
+    if floats && !page.foot.is_empty() {
+        ui.add_space(GAP);
+        ui.separator();
+        height += foot(ui, page, textures, &mut done);
+    }
+    (done, height + content.y)
+}
+
+/// Draws the foot; returns its height.
+fn foot<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures, done: &mut Vec<A>) -> f32 {
+    ui.add_space(GAP);
+    let row = ui.horizontal_wrapped(|ui| page.foot.iter().for_each(|item| draw(ui, item, textures, done)));
+    ui.add_space(GAP);
+    row.response.rect.height() + 4.0 * GAP
+}
+
 fn columns<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures, done: &mut Vec<A>) {
-    let width = (ui.available_width() - 12.0).min(WIDEST);
+    let width = ui.available_width() - 12.0;
     let beside = page.columns.len().max(1);
+    ui.set_max_width(width);
     if beside > 1 && width / beside as f32 > NARROW {
-        ui.set_max_width(width);
+        ui.spacing_mut().item_spacing.x = BETWEEN;
         ui.columns(beside, |columns| {
             for (ui, items) in columns.iter_mut().zip(&page.columns) {
+                ui.spacing_mut().item_spacing.x = GAP;
                 items.iter().for_each(|item| draw(ui, item, textures, done));
             }
         });
     } else {
-        ui.set_max_width(width);
         page.columns.iter().flatten().for_each(|item| draw(ui, item, textures, done));
     }
 }
@@ -229,48 +286,60 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
     match item {
         Item::Heading(text) => {
             ui.add_space(8.0);
-            ui.label(RichText::new(text).size(18.0).strong().color(SKY));
+            ui.label(RichText::new(tr(text)).size(18.0).strong().color(SKY));
         }
-        Item::Text(text) => _ = ui.label(RichText::new(text).size(15.0).color(INK)),
-        Item::Note(text) => _ = ui.label(RichText::new(text).color(PALE)),
+        Item::Text(text) => paragraph(ui, RichText::new(tr(text)).size(15.0).color(INK)),
+        Item::Note(text) => paragraph(ui, RichText::new(tr(text)).color(PALE)),
         Item::Verdict(passed, text) => {
             let colour = if *passed { GREEN } else { ORANGE };
-            ui.label(RichText::new(text).size(18.0).strong().color(colour));
+            paragraph(ui, RichText::new(tr(text)).size(18.0).strong().color(colour));
         }
         Item::Label(text, [r, g, b]) => {
             let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
             ui.painter().rect_filled(patch, 2.0, Color32::from_rgb(*r, *g, *b));
-            ui.label(RichText::new(text).color(INK));
+            ui.label(RichText::new(tr(text)).color(INK));
         }
         Item::Alert(text) => {
             egui::Frame::new().fill(VERMILION).inner_margin(10.0).show(ui, |ui| {
-                ui.label(RichText::new(text).size(16.0).strong().color(Color32::BLACK));
+                ui.label(RichText::new(tr(text)).size(16.0).strong().color(Color32::BLACK));
             });
         }
         Item::Button(button) => press(ui, button, done),
         Item::Row(items) => {
-            _ = ui.horizontal_wrapped(|ui| items.iter().for_each(|item| draw(ui, item, textures, done)));
+            let pictures = items.iter().filter(|item| matches!(item, Item::Picture(_))).count().max(1) as f32;
+            let each = (ui.available_width() - GAP * (pictures - 1.0)) / pictures;
+            _ = ui.horizontal_wrapped(|ui| {
+                for item in items {
+                    match item {
+                        Item::Picture(picture) => look(ui, picture, each.max(PICTURE_LEAST), textures, done),
+                        item => draw(ui, item, textures, done),
+                    }
+                }
+            });
         }
         Item::Choice(name, options, chosen, does) => choose(ui, (name, options, *chosen), *does, done),
         Item::Field(name, value, empty, does) => write(ui, [name, value, empty], *does, done),
-        Item::Amount(amount, does) => {
-            let (mut value, [low, high]) = (amount.value, amount.range);
-            let slider = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into()).text(&amount.name);
-            if ui.add(slider).changed() {
-                done.push(does(value));
-            }
-        }
+        Item::Amount(amount, does) => _ = ui.horizontal_wrapped(|ui| slide(ui, amount, *does, done)),
         Item::Progress(share, text) => {
-            ui.add(egui::ProgressBar::new(*share).text(text).animate(true).desired_height(22.0));
+            ui.add(egui::ProgressBar::new(*share).text(tr(text)).animate(true).desired_height(22.0));
         }
-        Item::Picture(picture) => look(ui, picture, textures, done),
+        Item::Picture(picture) => look(ui, picture, f32::INFINITY, textures, done),
         Item::Table(rows) => table(ui, rows),
         Item::Curve(title, values) => curve(ui, title, values),
     }
 }
 
+/// Shows a text whose lines begin at the left and end where they end.
+fn paragraph(ui: &mut egui::Ui, text: RichText) {
+    match ui.layout().horizontal_justify() {
+        true => _ = ui.with_layout(egui::Layout::top_down(egui::Align::LEFT), |ui| ui.label(text)),
+        false => _ = ui.label(text),
+    }
+}
+
 fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {
-    let mut text = RichText::new(&button.name).size(15.0);
+    let name = if button.is_name { button.name.clone() } else { tr(&button.name) };
+    let mut text = RichText::new(name).size(15.0);
     let mut shape = egui::Button::new(text.clone()).wrap().min_size(egui::vec2(44.0, 30.0));
     if button.main {
         text = text.strong().color(Color32::BLACK);
@@ -281,7 +350,7 @@ fn press<A: Clone>(ui: &mut egui::Ui, button: &Button<A>, done: &mut Vec<A>) {
         done.extend(button.does.clone());
     }
     if !button.hint.is_empty() {
-        shown.on_hover_text(&button.hint).on_disabled_hover_text(&button.hint);
+        shown.on_hover_text(tr(&button.hint)).on_disabled_hover_text(tr(&button.hint));
     }
 }
 
@@ -291,43 +360,56 @@ fn choose<A>(
     does: fn(usize) -> A,
     done: &mut Vec<A>,
 ) {
+    ui.add_space(2.0);
+    ui.label(RichText::new(tr(name)).color(PALE));
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(name).color(PALE));
+        ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
         for (at, option) in options.iter().enumerate() {
-            let shape = egui::Button::selectable(at == chosen, &option.name).min_size(egui::vec2(0.0, 26.0));
-            let shown = ui.add_enabled(option.open || at == chosen, shape);
+            let text = RichText::new(tr(&option.name));
+            let shape = egui::Button::selectable(at == chosen, text).frame_when_inactive(true);
+            let shown = ui.add_enabled(option.open || at == chosen, shape.min_size(egui::vec2(0.0, 26.0)));
             if shown.clicked() && at != chosen {
                 done.push(does(at));
             }
             if !option.hint.is_empty() {
-                shown.on_hover_text(&option.hint).on_disabled_hover_text(&option.hint);
+                shown.on_hover_text(tr(&option.hint)).on_disabled_hover_text(tr(&option.hint));
             }
         }
     });
 }
 
 fn write<A>(ui: &mut egui::Ui, [name, value, empty]: [&String; 3], does: fn(String) -> A, done: &mut Vec<A>) {
-    ui.horizontal_wrapped(|ui| {
-        let label = ui.label(RichText::new(name).color(PALE));
-        let mut text = value.clone();
-        let width = ui.available_width().clamp(120.0, 420.0);
-        let edit = egui::TextEdit::singleline(&mut text).hint_text(empty.as_str()).desired_width(width);
-        if ui.add(edit).labelled_by(label.id).changed() {
-            done.push(does(text));
-        }
-    });
+    ui.add_space(2.0);
+    let label = ui.label(RichText::new(tr(name)).color(PALE));
+    let mut text = value.clone();
+    let edit = egui::TextEdit::singleline(&mut text).hint_text(tr(empty)).margin(egui::vec2(8.0, 5.0));
+    if ui.add(edit.desired_width(420.0_f32.min(ui.available_width() - 16.0))).labelled_by(label.id).changed() {
+        done.push(does(text));
+    }
 }
 
-fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, textures: &mut Textures, done: &mut Vec<A>) {
+fn slide<A>(ui: &mut egui::Ui, amount: &Amount, does: fn(f32) -> A, done: &mut Vec<A>) {
+    let (mut value, [low, high]) = (amount.value, amount.range);
+    ui.spacing_mut().slider_width = (0.5 * ui.available_width()).clamp(100.0, 240.0);
+    let shown = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into());
+    let shown = ui.add(shown.fixed_decimals(if amount.step < 1.0 { 2 } else { 0 }));
+    let name = ui.label(RichText::new(tr(&amount.name)).color(PALE));
+    if shown.labelled_by(name.id).changed() {
+        done.push(does(value));
+    }
+}
+
+/// Shows a picture that is not wider than `widest` points.
+fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut Textures, done: &mut Vec<A>) {
     let id = textures.of(ui, picture);
     let image = &picture.image.1;
     let shape = image.width as f32 / image.height.max(1) as f32;
-    let width = ui.available_width().min(picture.height * shape).max(16.0);
+    let width = ui.max_rect().width().min(widest).min(picture.height * shape).max(16.0);
     let size = egui::vec2(width, width / shape);
     let (area, response) = ui.allocate_exact_size(size, egui::Sense::click_and_drag());
     let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
     ui.painter().image(id, area, whole, Color32::WHITE);
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &picture.name));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, tr(&picture.name)));
     for ([x, y], letter) in &picture.letters {
         let at = area.min + egui::vec2(x * area.width(), y * area.height());
         let font = egui::FontId::proportional(16.0);
@@ -359,8 +441,8 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, textures: &mut Textures, don
 }
 
 fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
-    ui.add_space(8.0);
-    ui.label(RichText::new(title).strong());
+    ui.add_space(GAP);
+    ui.label(RichText::new(tr(title)).size(14.0).color(INK));
     let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(at, value)| [at as f64 + 1.0, *value]).collect();
     let still = egui_plot::Plot::new(title).height(120.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
     still.show(ui, |plot| {
@@ -371,11 +453,18 @@ fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
 
 fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {
     let columns = rows.first().map_or(1, Vec::len);
-    egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).show(ui, |ui| {
+    let grid = egui::Grid::new(("table", rows.first())).num_columns(columns).striped(true).spacing([12.0, 8.0]);
+    let first = (0.32 * ui.available_width()).max(120.0);
+    grid.show(ui, |ui| {
         for (at, row) in rows.iter().enumerate() {
-            for cell in row {
-                let text = RichText::new(cell).size(14.0).color(INK);
-                ui.label(if at == 0 { text.strong() } else { text });
+            for (place, cell) in row.iter().enumerate() {
+                let text = RichText::new(tr(cell)).size(14.0).color(INK);
+                let label = egui::Label::new(if at == 0 { text.strong() } else { text });
+                // Only the first column holds sentences.
+                match place {
+                    0 => _ = ui.scope(|ui| (ui.set_max_width(first), ui.add(label.wrap()))),
+                    _ => _ = ui.add(label.extend()),
+                }
             }
             ui.end_row();
         }

@@ -7,6 +7,7 @@ use super::keys::{Command, label};
 use super::look::Look;
 use super::palette::{GREEN, ORANGE, SKY};
 use super::plot::{Drawn, Trace};
+use super::words::{sentence, tr};
 use super::{Choice, Panel, tool_icon};
 use eframe::egui::{self, Color32, RichText};
 
@@ -52,8 +53,8 @@ pub(crate) fn show(
         ui.add_space(4.0);
         let name = if panel.timeline.is_some() { "Close the replay" } else { "End the operation" };
         let end =
-            egui::Button::new(RichText::new(name).strong()).wrap().min_size(egui::vec2(ui.available_width(), 32.0));
-        if ui.add(end).on_hover_text("Q; the report is written and shown").clicked() {
+            egui::Button::new(RichText::new(tr(name)).strong()).wrap().min_size(egui::vec2(ui.available_width(), 32.0));
+        if ui.add(end).on_hover_text(tr("Q; the report is written and shown")).clicked() {
             clicks.commands.push(Command::Quit);
         }
         ui.add_space(4.0);
@@ -61,17 +62,18 @@ pub(crate) fn show(
     // All of it scrolls: nothing is cut off on a small screen.
     egui::ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
         ui.add_space(8.0);
-        ui.label(RichText::new(&panel.phase).size(22.0).strong());
-        ui.label(RichText::new(format!("case {}", panel.case)).weak());
-        ui.label(RichText::new(&panel.hint).size(14.0));
+        ui.label(RichText::new(tr(&panel.phase)).size(22.0).strong());
+        ui.label(RichText::new(format!("{} {}", tr("case"), panel.case)).weak());
+        ui.label(RichText::new(sentence(&tr(&panel.hint))).size(15.0).strong());
         ui.separator();
         force(ui, panel, traces);
         grid(ui, "task", &panel.task, 16.0);
         ui.separator();
-        buttons(ui, panel, look, &mut clicks);
+        pedal(ui, panel, &mut clicks);
         for (at, choice) in panel.choices.iter().enumerate() {
             clicks.chosen = options(ui, choice).map(|option| [at, option]).or(clicks.chosen);
         }
+        buttons(ui, panel, look, &mut clicks);
         if panel.by_hand {
             by_mouse(ui, &mut hand.guide);
         }
@@ -79,10 +81,10 @@ pub(crate) fn show(
         look.show(ui, &mut hand.camera);
         ui.separator();
         if filming {
-            ui.label(RichText::new("every picture of the window is saved").strong().color(ORANGE));
+            ui.label(RichText::new(tr("every picture of the window is saved")).strong().color(ORANGE));
         }
         ui.horizontal_wrapped(|ui| window_buttons(ui, &mut clicks));
-        let engineering = egui::CollapsingHeader::new("Engineering").default_open(false);
+        let engineering = egui::CollapsingHeader::new(tr("Engineering")).default_open(false);
         engineering.show(ui, |ui| {
             rate(ui, panel, traces);
             grid(ui, "values", &panel.values, 13.0);
@@ -100,7 +102,7 @@ fn window_buttons(ui: &mut egui::Ui, clicks: &mut Clicks) {
         (Command::FullScreen, "without the frame of the window"),
         (Command::Help, "all keys and what the mouse does"),
     ] {
-        if ui.button(label(command)).on_hover_text(why).clicked() {
+        if ui.button(label(command)).on_hover_text(tr(why)).clicked() {
             clicks.commands.push(command);
         }
     }
@@ -111,16 +113,16 @@ fn heading(ui: &mut egui::Ui, text: String) {
 }
 
 fn force(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
-    heading(ui, format!("Force  {:.2} N", panel.force_n));
+    heading(ui, tr(&format!("Force  {:.2} N", panel.force_n)));
     traces.force.show(ui, Drawn { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
     let most = traces.force.most();
     let note = format!("last {SECONDS_SHOWN:.0} s, most {most:.2} N, limit {:.1} N", panel.force_limit_n);
-    ui.label(RichText::new(note).small()).on_hover_text("what your hand would feel on a device with force");
+    ui.label(RichText::new(tr(&note)).size(12.0)).on_hover_text(tr("what your hand would feel on a device with force"));
 }
 
 fn rate(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
     if panel.rate_hz > 0.0 {
-        heading(ui, format!("Rate  {:.0} Hz", panel.rate_hz));
+        heading(ui, tr(&format!("Rate  {:.0} Hz", panel.rate_hz)));
         traces.rate.show(ui, Drawn { name: "rate", height: 50.0, mark: panel.wanted_rate_hz.into(), colour: GREEN });
     }
 }
@@ -129,83 +131,100 @@ fn grid(ui: &mut egui::Ui, id: &str, values: &[(String, String)], size: f32) {
     for (name, value) in values {
         ui.push_id((id, name), |ui| {
             ui.horizontal_wrapped(|ui| {
-                ui.label(RichText::new(name).size(size));
-                ui.label(RichText::new(value).size(size).monospace().strong());
+                ui.label(RichText::new(tr(name)).size(size));
+                ui.label(RichText::new(tr(value)).size(size).monospace().strong());
             });
         });
     }
 }
 
+fn wide(ui: &egui::Ui, text: RichText, height: f32) -> egui::Button<'static> {
+    egui::Button::new(text).wrap().min_size(egui::vec2(ui.available_width(), height))
+}
+
+/// The button that is held down to drill.
+fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
+    if !panel.by_hand {
+        return;
+    }
+    let name = RichText::new(tr(if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" })).strong();
+    let pedal = match panel.drilling {
+        true => wide(ui, name.color(Color32::BLACK), 32.0).fill(ORANGE),
+        false => wide(ui, name, 32.0),
+    };
+    // A widget that only senses clicks counts as released after 0.8 s.
+    let held = ui.add_enabled(panel.no_drill.is_none(), pedal.sense(egui::Sense::drag()));
+    clicks.pedal = held.is_pointer_button_down_on();
+    if let Some(why) = &panel.no_drill {
+        held.on_disabled_hover_text(tr(why));
+    }
+}
+
+/// The commands to hand and view, and the session's own actions.
 fn buttons(ui: &mut egui::Ui, panel: &Panel, look: &Look, clicks: &mut Clicks) {
-    let width = ui.available_width();
-    let wide = |text: RichText, height: f32| egui::Button::new(text).wrap().min_size(egui::vec2(width, height));
-    if panel.by_hand {
-        let name = if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" };
-        let mut pedal = wide(RichText::new(name).strong(), 32.0);
-        if panel.drilling {
-            pedal = wide(RichText::new(name).strong().color(Color32::BLACK), 32.0).fill(ORANGE);
-        }
-        // A widget that only senses clicks counts as released after 0.8 s.
-        let held = ui.add_enabled(panel.no_drill.is_none(), pedal.sense(egui::Sense::drag()));
-        clicks.pedal = held.is_pointer_button_down_on();
-        if let Some(why) = &panel.no_drill {
-            held.on_disabled_hover_text(why);
-        }
-    }
-    let next = format!("{}: {}", label(Command::NextTool), panel.tool);
-    let of_hand = [Command::NextTool, Command::Undo, Command::Redo, Command::Withdraw];
-    let of_view = [Command::Reset, Command::FocusTool];
-    for command in of_hand.into_iter().filter(|_| panel.by_hand).chain(of_view) {
-        let name = if command == Command::NextTool { next.clone() } else { label(command) };
-        let why_not = refusal(command, panel, look);
-        let mut button = ui.add_enabled(why_not.is_none(), wide(RichText::new(name), 26.0));
-        if let Some(why) = why_not {
-            button = button.on_disabled_hover_text(why);
-        }
-        if button.clicked() {
-            clicks.commands.push(command);
-        }
-    }
     for (at, action) in panel.actions.iter().enumerate() {
         let key = action.key.map_or_else(String::new, |key| format!(" ({})", key.to_uppercase()));
-        let name = RichText::new(format!("{}{key}", action.name));
-        let button = if action.on { wide(name.color(Color32::BLACK), 26.0).fill(SKY) } else { wide(name, 26.0) };
+        let name = RichText::new(format!("{}{key}", tr(&action.name)));
+        let button = match action.on {
+            true => wide(ui, name.color(Color32::BLACK), 26.0).fill(SKY),
+            false => wide(ui, name, 26.0),
+        };
         let mut button = ui.add_enabled(action.why_not.is_none(), button);
         if let Some(why) = &action.why_not {
-            button = button.on_disabled_hover_text(why);
+            button = button.on_disabled_hover_text(tr(why));
         }
         if button.clicked() {
             clicks.actions |= 1 << at;
         }
     }
+    let of_hand = [Command::Undo, Command::Redo, Command::Withdraw, Command::NextTool];
+    let of_view = [Command::Reset, Command::FocusTool];
+    ui.horizontal_wrapped(|ui| {
+        for command in of_hand.into_iter().filter(|_| panel.by_hand).chain(of_view) {
+            let why_not = refusal(command, panel, look);
+            let mut button = ui.add_enabled(why_not.is_none(), egui::Button::new(label(command)));
+            if let Some(why) = why_not {
+                button = button.on_disabled_hover_text(tr(&why));
+            }
+            if button.clicked() {
+                clicks.commands.push(command);
+            }
+        }
+    });
 }
 
 /// What the left button does.
 fn by_mouse(ui: &mut egui::Ui, guide: &mut Guide) {
-    ui.checkbox(&mut guide.drills, "The left button drills")
-        .on_hover_text("Held down on the skull, the left button lowers the tool, runs it and pushes it in");
-    let feed = egui::Slider::new(&mut guide.feed_mm_s, FEEDS).logarithmic(true).fixed_decimals(1).text("feed, mm/s");
-    ui.add(feed).on_hover_text("How fast the held button pushes the tool along its shaft");
+    ui.checkbox(&mut guide.drills, tr("The left button drills"))
+        .on_hover_text(tr("Held down on the skull, the left button lowers the tool, runs it and pushes it in"));
+    let feed =
+        egui::Slider::new(&mut guide.feed_mm_s, FEEDS).logarithmic(true).fixed_decimals(1).text(tr("feed, mm/s"));
+    ui.add(feed).on_hover_text(tr("How fast the held button pushes the tool along its shaft"));
 }
 
 /// The options of a choice; returns the one clicked.
 fn options(ui: &mut egui::Ui, choice: &Choice) -> Option<usize> {
     let mut clicked = None;
     if choice.tools.len() == choice.options.len() && !choice.tools.is_empty() {
-        for (at, (tool, (name, open))) in choice.tools.iter().zip(&choice.options).enumerate() {
+        for (at, (tool, (name, why_not))) in choice.tools.iter().zip(&choice.options).enumerate() {
             let chosen = at == choice.chosen;
-            if tool_icon::show(ui, tool, at + 1, name, (*open || chosen, chosen)) && !chosen {
+            let why_not = why_not.as_deref().filter(|_| !chosen);
+            if tool_icon::show(ui, tool, at + 1, name, (why_not, chosen)) && !chosen {
                 clicked = Some(at);
             }
         }
         return clicked;
     }
     ui.horizontal_wrapped(|ui| {
-        ui.label(format!("{}:", choice.name));
-        for (at, (name, open)) in choice.options.iter().enumerate() {
-            let option = egui::Button::selectable(at == choice.chosen, name);
-            if ui.add_enabled(*open || at == choice.chosen, option).clicked() && at != choice.chosen {
+        ui.label(format!("{}:", tr(&choice.name)));
+        for (at, (name, why_not)) in choice.options.iter().enumerate() {
+            let option = egui::Button::selectable(at == choice.chosen, tr(name));
+            let shown = ui.add_enabled(why_not.is_none() || at == choice.chosen, option);
+            if shown.clicked() && at != choice.chosen {
                 clicked = Some(at);
+            }
+            if let Some(why) = why_not {
+                shown.on_disabled_hover_text(tr(why));
             }
         }
     });

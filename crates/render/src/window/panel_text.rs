@@ -63,8 +63,8 @@ pub struct Panel {
 pub struct Choice {
     /// Name of the choice: `Tool`, `Burr`.
     pub name: String,
-    /// The options, and whether each is available.
-    pub options: Vec<(String, bool)>,
+    /// The options, and why each cannot be chosen now; `None` where it can.
+    pub options: Vec<(String, Option<String>)>,
     /// Index of the selected option.
     pub chosen: usize,
     /// The tools that the options stand for, shown with icons and number keys; else empty.

@@ -6,6 +6,7 @@
 //! every pixel is drawn, then its edges are smoothed sample by sample, then nothing until something
 //! moves again.
 
+use super::Pace;
 use crate::{Camera, Cut, Frame, SliceLook, Stereo};
 use glam::Vec3;
 use trepan_geometry::{Pose, Tool};
@@ -20,15 +21,18 @@ const SLOW_S: f64 = 0.058;
 /// A numerical parameter: frame time at which one more step at once is needed, s.
 const VERY_SLOW_S: f64 = 0.120;
 
-/// A numerical parameter: time for drawing below which a finer picture is possible (at about twice
-/// the cost), s.
-const FAST_S: f64 = 0.018;
+/// A numerical parameter: frame time below which a finer picture is tried, s.
+const FAST_S: f64 = 0.85 * SLOW_S;
+
+/// A numerical parameter: time for drawing below which fewer pixels would not help, s.
+const SHORT_S: f64 = 0.018;
 
 /// Consecutive slow pictures before the picture gets coarser.
 const PATIENCE_SLOW: u32 = 2;
 
-/// Consecutive fast pictures before the picture gets finer.
-const PATIENCE_FAST: u32 = 20;
+/// Consecutive fast pictures before the picture gets finer; twice as many after each finer picture
+/// that was too slow, up to the second number.
+const PATIENCE_FAST: [u32; 2] = [20, 640];
 
 /// A numerical parameter: time without motion before the sharp picture, s.
 const REST_S: f64 = 0.25;
@@ -68,6 +72,10 @@ pub(crate) struct Quality {
     level: usize,
     slow: u32,
     fast: u32,
+    /// Fast pictures needed for a finer one.
+    patience: u32,
+    /// Pictures since it got finer.
+    since_finer: u32,
     seen: Option<Seen>,
     moved_at: f64,
     rest: Rest,
@@ -76,6 +84,8 @@ pub(crate) struct Quality {
     paced: bool,
     /// Mean time between pictures while something moves, s.
     interval_s: f64,
+    /// The last picture, if something moved in it and in the one before.
+    pub pace: Option<Pace>,
 }
 
 impl Quality {
@@ -83,7 +93,8 @@ impl Quality {
     /// coarse one without.
     pub fn new(software: bool, detail: f32) -> Self {
         let wanted = DETAILS.iter().position(|&d| d <= detail).unwrap_or(DETAILS.len() - 1);
-        Self { level: wanted.max(if software { 3 } else { 0 }), ..Self::default() }
+        let (level, patience) = (wanted.max(if software { 3 } else { 0 }), PATIENCE_FAST[0]);
+        Self { level, patience, since_finer: u32::MAX, ..Self::default() }
     }
 
     /// Chooses the next step for a frame in an area of `size` pixels at a time, s; `pending` says
@@ -116,22 +127,25 @@ impl Quality {
     pub fn note(&mut self, drawing_s: f64, now: f64) {
         let interval = now - std::mem::replace(&mut self.last, now);
         let moves = self.rest == Rest::Moving;
+        self.pace = None;
         // A sharp picture before says nothing of the pace.
         if !std::mem::replace(&mut self.paced, moves) || !moves || self.moved_at != now {
             return;
         }
+        self.pace = Some(Pace { interval_s: interval, detail: self.detail() });
         self.interval_s += (interval - self.interval_s) * if self.interval_s == 0.0 { 1.0 } else { 0.15 };
         // Where drawing is short, others keep the window waiting: fewer pixels would not help.
-        self.slow = if interval > SLOW_S && drawing_s > FAST_S { self.slow + 1 } else { 0 };
-        self.fast = if drawing_s < FAST_S && interval < SLOW_S { self.fast + 1 } else { 0 };
-        let level = match () {
-            () if self.slow >= PATIENCE_SLOW => {
-                (self.level + 1 + usize::from(interval > VERY_SLOW_S)).min(DETAILS.len() - 1)
-            }
-            () if self.fast >= PATIENCE_FAST => self.level.saturating_sub(1),
-            () => return,
-        };
-        (self.level, self.slow, self.fast) = (level, 0, 0);
+        self.slow = if interval > SLOW_S && drawing_s > SHORT_S { self.slow + 1 } else { 0 };
+        self.fast = if interval < FAST_S { self.fast + 1 } else { 0 };
+        self.since_finer = self.since_finer.saturating_add(1);
+        if self.slow >= PATIENCE_SLOW {
+            let in_vain = self.since_finer < PATIENCE_FAST[0];
+            self.patience = if in_vain { (2 * self.patience).min(PATIENCE_FAST[1]) } else { PATIENCE_FAST[0] };
+            self.level = (self.level + 1 + usize::from(interval > VERY_SLOW_S)).min(DETAILS.len() - 1);
+            (self.slow, self.fast) = (0, 0);
+        } else if self.fast >= self.patience && self.level > 0 {
+            (self.level, self.slow, self.fast, self.since_finer) = (self.level - 1, 0, 0, 0);
+        }
     }
 
     /// Fraction of the 3-D view's pixels along an edge while something moves.
@@ -257,6 +271,22 @@ mod tests {
         assert_eq!(settled(0.08, 500), 0.75);
         assert_eq!(settled(0.3, 500), 0.4);
         assert_eq!(settled(50.0, 500), 0.16);
+    }
+
+    #[test]
+    fn a_finer_picture_that_is_too_slow_is_tried_ever_more_rarely() {
+        let mut quality = Quality::new(false, 0.75);
+        let (mut now, mut tries) = (0.0, Vec::new());
+        for n in 0..2000 {
+            quality.step(&frame(n), SIZE, false, now);
+            let cost = 0.08 * f64::from(quality.detail().powi(2));
+            let before = quality.detail();
+            quality.note(cost, now);
+            tries.extend((quality.detail() > before).then_some(n));
+            now += cost;
+        }
+        let apart: Vec<u32> = tries.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(apart.len() >= 4 && apart.windows(2).all(|pair| pair[1] > pair[0].min(640)), "{apart:?}");
     }
 
     #[test]

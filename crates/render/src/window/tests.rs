@@ -15,7 +15,7 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// A session that returns a given panel and stores its inputs.
 #[derive(Default)]
-struct TestSession {
+pub(super) struct TestSession {
     panel: Panel,
     inputs: Vec<WindowInput>,
     captures: Vec<(Capture, [u32; 2])>,
@@ -37,15 +37,16 @@ impl Session for TestSession {
 }
 
 /// The parameters of a requested picture.
-struct Requested {
+pub(super) struct Requested {
     bone: bool,
     brain: bool,
     slices: SliceLook,
     camera: Camera,
+    size: [u32; 2],
 }
 
 /// Draws by the processor and stores the requested parameters.
-struct TestPainter(Painter, Option<Requested>);
+pub(super) struct TestPainter(Painter, Option<Requested>);
 
 impl Draws for TestPainter {
     fn device(&self) -> Option<&Gpu> {
@@ -60,20 +61,20 @@ impl Draws for TestPainter {
         None
     }
 
-    fn picture(&mut self, frame: &Frame, _size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
         let &Frame { show_bone: bone, show_brain: brain, slices, camera, .. } = frame;
-        self.1 = Some(Requested { bone, brain, slices, camera });
+        self.1 = Some(Requested { bone, brain, slices, camera, size });
         Draws::picture(&mut self.0, frame, [160, 120], detail)
     }
 }
 
-struct Bench {
-    window: Harness<'static, Window<TestSession, TestPainter>>,
+pub(super) struct Bench {
+    pub window: Harness<'static, Window<TestSession, TestPainter>>,
     lent: Lent<TestSession, TestPainter>,
 }
 
 impl Bench {
-    fn with(panel: Panel) -> Self {
+    pub fn with(panel: Panel) -> Self {
         let bone = VoxelVolume::isotropic([12; 3], Vec3::splat(-5.5), 1.0, 900i16);
         let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
         let data = SceneData { bone, brain: None, mri: None, tint: None };
@@ -97,7 +98,7 @@ impl Bench {
     }
 
     /// Presses a key; returns the session's next input.
-    fn press(&mut self, key: Key) -> WindowInput {
+    pub fn press(&mut self, key: Key) -> WindowInput {
         self.window.key_down(key);
         self.window.step();
         let input = self.last_input();
@@ -199,7 +200,7 @@ fn keys_and_buttons_give_the_same_input_once() {
     bench.window.step();
     assert!(!bench.last_input().undo);
     bench.set_panel(|panel| panel.tool = "probe".into());
-    assert!(bench.click("Next tool (N): probe").next_tool);
+    assert!(bench.click("Next tool (N)").next_tool);
 }
 
 #[test]
@@ -250,6 +251,21 @@ fn hidden_parts_are_not_drawn() {
 }
 
 #[test]
+fn slices_get_a_window_of_their_own_and_the_view_the_whole_of_the_first() {
+    let mut bench = Bench::in_hand();
+    let [width, height] = bench.last_request().size;
+    bench.press(Key::W);
+    let apart = bench.last_request().size;
+    assert_eq!(apart, [width + height / 3, height]);
+    bench.press(Key::W);
+    assert_eq!(bench.last_request().size, [width, height]);
+    bench.press(Key::S);
+    bench.press(Key::W);
+    assert_eq!(bench.last_request().size, [width, height], "there are no slices to set apart");
+    assert!(bench.shows("the slices are switched off"));
+}
+
+#[test]
 fn the_microscope_looks_straight_down_and_back_again() {
     let mut bench = Bench::with(Panel::default());
     let orbit = bench.last_request().camera;
@@ -266,7 +282,8 @@ fn the_microscope_looks_straight_down_and_back_again() {
 
 #[test]
 fn an_open_option_is_chosen_and_a_closed_one_is_not() {
-    let options = [("burr 4 mm", true), ("burr 6 mm", true), ("perforator", false)].map(|(n, o)| (n.to_string(), o));
+    let options = [("burr 4 mm", None), ("burr 6 mm", None), ("perforator", Some("not now"))];
+    let options = options.map(|(name, why_not)| (name.to_string(), why_not.map(String::from)));
     let choice = Choice { name: "Tool".into(), options: options.into(), ..Choice::default() };
     let mut bench = Bench::with(Panel { choices: vec![Choice::default(), choice], ..Panel::default() });
     assert_eq!(bench.click("burr 6 mm").chosen, Some([1, 1]));
@@ -347,7 +364,8 @@ fn pictures_of_the_window_reach_the_session() {
     bench.press(Key::P);
     assert_eq!(take_pictures(&mut bench), 1);
     let captures = |bench: &Bench| bench.lent.borrow().as_ref().unwrap().session.captures.clone();
-    assert_eq!(captures(&bench), [(Capture::Picture, [4, 3])]);
+    let kinds: Vec<Capture> = captures(&bench).into_iter().map(|(what, _)| what).collect();
+    assert_eq!(kinds, [Capture::Picture]);
     bench.press(Key::V);
     assert!(bench.shows("every picture of the window is saved"));
     let taken: usize = (0..5).map(|_| take_pictures(&mut bench)).sum();
@@ -414,7 +432,7 @@ fn arrow_keys_move_the_tool_unless_a_slider_has_them() {
 #[test]
 fn every_key_answers_on_screen_whether_it_applies_or_not() {
     let tools = vec![Tool::burr(3.0), Tool::probe(2.0)];
-    let options = vec![("burr".into(), true), ("probe".into(), false)];
+    let options = vec![("burr".into(), None), ("probe".into(), Some("the bone is not open".into()))];
     let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
     let flap = Action { name: "Lift".into(), key: Some('f'), why_not: Some("no flap".into()), ..Action::default() };
     let refused = Some("nothing yet".to_string());
@@ -457,12 +475,12 @@ fn what_cannot_be_used_is_grey_and_does_nothing() {
 #[test]
 fn number_keys_take_tools() {
     let tools = vec![Tool::burr(3.0), Tool::craniotome(), Tool::probe(2.0)];
-    let options = ["burr", "craniotome", "probe"].map(|name| (name.to_string(), true)).into();
+    let options = ["burr", "craniotome", "probe"].map(|name| (name.to_string(), None)).into();
     let choices = vec![Choice { name: "Tool".into(), options, chosen: 0, tools }];
     let mut bench = Bench::with(Panel { by_hand: true, choices, ..Panel::default() });
     assert_eq!(bench.press(Key::Num2).chosen, Some([0, 1]));
     assert_eq!(bench.press(Key::Num1).chosen, None);
-    assert!(bench.shows("the burr is in the hand"));
+    assert!(bench.shows("it is in the hand: burr"));
     assert_eq!(bench.click("3  probe").chosen, Some([0, 2]));
     bench.press(Key::Num7);
     assert!(bench.shows("there is no tool number 7"));
@@ -475,7 +493,7 @@ fn no_control_is_out_of_reach_on_small_and_large_screens() {
     let timeline =
         Timeline { at_s: 3.0, length_s: 10.0, ready_s: 5.0, running: false, speed: 1.0, marks: marks.into() };
     let tools = vec![Tool::burr(3.0), Tool::craniotome(), Tool::perforator()];
-    let options = ["burr 6 mm", "craniotome", "perforator 11 mm"].map(|name| (name.to_string(), true)).into();
+    let options = ["burr 6 mm", "craniotome", "perforator 11 mm"].map(|name| (name.to_string(), None)).into();
     let choices = vec![Choice { name: "Tool".into(), options, chosen: 0, tools }];
     let full = Panel { by_hand: true, choices, timeline: Some(timeline), ..Panel::default() };
     for (size, scale) in [

@@ -1,6 +1,7 @@
 //! The timeline bar of a replay: run, speed, events and position.
 
 use super::palette::{ORANGE, PALE, SKY, VERMILION};
+use super::words::tr;
 use super::{Playback, Timeline};
 use eframe::egui::{self, Key, RichText};
 
@@ -46,11 +47,11 @@ impl Timeline {
 fn buttons(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut asked = None;
     let name = if timeline.running { "Pause (Space)" } else { "Run (Space)" };
-    if ui.add(egui::Button::new(name).min_size(egui::vec2(110.0, 26.0))).clicked() {
+    if ui.add(egui::Button::new(tr(name)).min_size(egui::vec2(110.0, 26.0))).clicked() {
         asked = Some(Playback::Run(!timeline.running));
     }
     for (name, time) in [("Event before ([)", timeline.before()), ("Event after (])", timeline.after())] {
-        if ui.add_enabled(time.is_some(), egui::Button::new(name)).clicked() {
+        if ui.add_enabled(time.is_some(), egui::Button::new(tr(name))).clicked() {
             asked = time.map(Playback::Seek);
         }
     }
@@ -63,11 +64,11 @@ fn buttons(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     ui.label(RichText::new(time).monospace());
     if timeline.ready_s < timeline.length_s {
         let share = 100.0 * timeline.ready_s / timeline.length_s.max(1e-9);
-        ui.label(RichText::new(format!("{share:.0} % made")).color(ORANGE));
+        ui.label(RichText::new(tr(&format!("{share:.0} % made"))).color(ORANGE));
     }
     let last = timeline.marks.iter().rev().find(|mark| mark.at_s <= timeline.at_s + HERE_S);
     if let Some(mark) = last {
-        let text = RichText::new(&mark.text).color(if mark.warning { ORANGE } else { PALE });
+        let text = RichText::new(tr(&mark.text)).color(if mark.warning { ORANGE } else { PALE });
         // A longer row would widen the bar too.
         ui.add(egui::Label::new(text).truncate());
     }
@@ -79,7 +80,7 @@ fn buttons(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
 fn bar(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut at_s = timeline.at_s;
     ui.spacing_mut().slider_width = (ui.available_width() - 80.0).max(60.0);
-    let slider = egui::Slider::new(&mut at_s, 0.0..=timeline.length_s.max(1e-3)).show_value(false).text("time, s");
+    let slider = egui::Slider::new(&mut at_s, 0.0..=timeline.length_s.max(1e-3)).show_value(false).text(tr("time, s"));
     let response = ui.add(slider);
     let rail =
         egui::Rect::from_min_size(response.rect.min, egui::vec2(ui.spacing().slider_width, response.rect.height()));
@@ -94,7 +95,7 @@ fn bar(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let pointed = ui.input(|i| i.pointer.hover_pos()).filter(|pos| rail.expand(3.0).contains(*pos));
     let near = pointed.and_then(|pos| timeline.marks.iter().find(|mark| (x(mark.at_s) - pos.x).abs() < 3.0));
     if let Some(mark) = near {
-        response.clone().on_hover_text_at_pointer(format!("{:.2} s   {}", mark.at_s, mark.text));
+        response.clone().on_hover_text_at_pointer(format!("{:.2} s   {}", mark.at_s, tr(&mark.text)));
     }
     response.changed().then_some(Playback::Seek(at_s))
 }

@@ -1,6 +1,7 @@
 //! A button with a tool's silhouette, its number key and its name.
 
 use super::palette::SKY;
+use super::words::tr;
 use eframe::egui::{self, Color32, Sense, Stroke, TextStyle, WidgetInfo};
 use trepan_geometry::{Tool, ToolKind};
 
@@ -11,12 +12,14 @@ const HEIGHT: f32 = 26.0;
 /// Points per mm of a silhouette.
 const SCALE: f32 = 1.6;
 
-/// Shows the button of a tool; returns whether it was clicked.
-pub(crate) fn show(ui: &mut egui::Ui, tool: &Tool, number: usize, name: &str, (open, chosen): (bool, bool)) -> bool {
+/// Shows the button of a tool; returns whether it was clicked. `state`: why it cannot be taken, and
+/// whether it is in the hand.
+pub(crate) fn show(ui: &mut egui::Ui, tool: &Tool, number: usize, name: &str, state: (Option<&str>, bool)) -> bool {
+    let ((why_not, chosen), open) = (state, state.0.is_none());
     let size = egui::vec2(ui.available_width().max(ICON), HEIGHT);
     let sense = if open { Sense::click() } else { Sense::hover() };
     let (area, response) = ui.allocate_exact_size(size, sense);
-    let label = format!("{number}  {name}");
+    let label = format!("{number}  {}", tr(name));
     response.widget_info(|| WidgetInfo::selected(egui::Role::Button, open, chosen, &label));
     let visuals = ui.style().interact_selectable(&response, chosen);
     let ink = if open { visuals.text_color() } else { ui.visuals().weak_text_color() };
@@ -27,11 +30,8 @@ pub(crate) fn show(ui: &mut egui::Ui, tool: &Tool, number: usize, name: &str, (o
     let at = egui::pos2(area.left() + ICON + 4.0, area.center().y);
     let font = TextStyle::Button.resolve(ui.style());
     ui.painter().with_clip_rect(area).text(at, egui::Align2::LEFT_CENTER, label, font, ink);
-    let response = match open {
-        true => response.on_hover_text(format!("{} (key {number})", use_of(tool.kind))),
-        false => response.on_hover_text("not to be taken now: the tool is not in this window's hand"),
-    };
-    response.clicked()
+    let hint = why_not.map_or_else(|| format!("{} ({} {number})", tr(use_of(tool.kind)), tr("key")), tr);
+    response.on_hover_text(hint).clicked()
 }
 
 fn silhouette(painter: &egui::Painter, area: egui::Rect, tool: &Tool, ink: Color32) {

@@ -18,6 +18,7 @@ use crate::case::identity::Identity;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
+use crate::progress::DraftSkull;
 use crate::recipe::Recipe;
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -95,37 +96,33 @@ pub(crate) fn identity(folder: &Path) -> Result<Identity, SessionError> {
     card(folder).map(|Card { name, hash, images, .. }| Identity { name, case: Some(hash), images })
 }
 
-/// A skull that is only looked at.
-pub(crate) struct DraftSkull {
-    /// Its densities, HU.
-    pub hu: VoxelVolume<i16>,
-    /// Threshold of bone, HU.
-    pub isovalue_hu: i16,
-    /// Where it is opened.
-    pub opening: Opening,
-}
-
-/// Reads the skull of a case folder for a draft; `None` without a skull. It is not checked, and
-/// thinned to voxels of about 1.5 mm.
-pub(crate) fn draft_skull(folder: &Path) -> Result<Option<DraftSkull>, SessionError> {
+/// Reads the skull of a case folder for a draft, and where it is opened; `None` without a skull. It
+/// is not checked.
+pub(crate) fn draft_skull(folder: &Path) -> Result<Option<(DraftSkull, Opening)>, SessionError> {
     let card = card(folder)?;
     let Some(opening) = card.opening.filter(|_| card.files.contains_key(SKULL)) else { return Ok(None) };
     let volume = nifti::read(&folder.join(SKULL)).map_err(|fault| broken(folder, SKULL, &fault))?;
     let hu = hounsfield(&volume).map_err(|fault| broken(folder, SKULL, &fault))?;
-    let every = (DRAFT_MM / hu.spacing_mm().max_element()).round().max(1.0) as usize;
-    Ok(Some(DraftSkull { hu: thinned(&hu, every), isovalue_hu: card.isovalue_hu, opening }))
+    Ok(Some((in_draft(&hu, card.isovalue_hu), opening)))
+}
+
+/// Thins a CT to voxels of about 1.5 mm.
+pub(crate) fn in_draft(hu: &VoxelVolume<i16>, isovalue_hu: i16) -> DraftSkull {
+    let every = hu.spacing_mm().to_array().map(|mm| (DRAFT_MM / mm).round().max(1.0) as usize);
+    DraftSkull { hu: thinned(hu, every), isovalue_hu }
 }
 
 /// Edge of a draft's voxels, mm, numerical.
 const DRAFT_MM: f64 = 1.5;
 
 /// Takes every nth voxel along each edge.
-fn thinned(volume: &VoxelVolume<i16>, every: usize) -> VoxelVolume<i16> {
-    let dims = volume.dims.map(|n| n.div_ceil(every));
-    let scale = DAffine3::from_scale(DVec3::splat(every as f64));
+fn thinned(volume: &VoxelVolume<i16>, every: [usize; 3]) -> VoxelVolume<i16> {
+    let dims = [0, 1, 2].map(|n| volume.dims[n].div_ceil(every[n]));
+    let scale = DAffine3::from_scale(DVec3::from_array(every.map(|n| n as f64)));
     let mut thin = VoxelVolume::filled(dims, volume.world_from_voxel * scale, 0i16);
     for at in 0..thin.data.len() {
-        let voxel = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])].map(|n| n * every);
+        let voxel = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
+        let voxel = [0, 1, 2].map(|n| voxel[n] * every[n]);
         thin.data[at] = volume.data[volume.index(voxel)];
     }
     thin
@@ -186,7 +183,7 @@ mod tests {
         let mut volume = VoxelVolume::isotropic([5, 4, 4], Vec3::new(1.0, 2.0, 3.0), 0.5, 7i16);
         let at = volume.index([4, 2, 0]);
         volume.data[at] = 9;
-        let thin = thinned(&volume, 2);
+        let thin = thinned(&volume, [2; 3]);
         assert_eq!((thin.dims, thin.get([2, 1, 0])), ([3, 2, 2], Some(9)));
         assert_eq!(thin.centre_of([2, 1, 0]), volume.centre_of([4, 2, 0]));
     }

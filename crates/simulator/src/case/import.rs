@@ -272,6 +272,7 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     stages.next("reading the CT")?;
     let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut notes)).transpose()?;
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
+    stages.offer_skull(ct.as_ref().map(|ct| || case_folder::in_draft(ct, isovalue_hu)));
     stages.next("reading the MRI")?;
     let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, recipe.mri_series, &mut notes)).transpose()?;
     let (mut fit, mut ct_from_mri) = (Fit::new(), DAffine3::IDENTITY);

@@ -1,7 +1,7 @@
 //! Progress of an import: shows the running stage, and the share of each stage at the end.
 
 use crate::error::SessionError;
-use crate::progress::Progress;
+use crate::progress::{DraftSkull, Progress};
 use crate::run::clock::Clock;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
@@ -31,6 +31,11 @@ impl ImportStages {
         self.bar.inc(1);
         self.bar.set_message(what);
         self.progress.next(what)
+    }
+
+    /// Hands the skull of a CT to a window that shows it while the rest is loading.
+    pub fn offer_skull(&self, skull: Option<impl FnOnce() -> DraftSkull>) {
+        self.progress.offer_skull(skull);
     }
 
     /// Hides the bar during a call that prints.

@@ -45,6 +45,8 @@ pub(crate) enum Action {
     Tool(usize),
     /// Chooses a quality.
     Quality(usize),
+    /// Chooses the language of the window.
+    Language(usize),
     /// Sets the flap's diameter, mm.
     Flap(f32),
     /// Shows the chosen case in pictures.

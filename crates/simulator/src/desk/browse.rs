@@ -40,6 +40,15 @@ impl Goal {
         }
     }
 
+    /// What a folder without such files means.
+    pub fn none(self) -> &'static str {
+        match self {
+            Self::Ct | Self::Mri => "no images here: open a folder on the left",
+            Self::Case => "a case is a folder: open it on the left",
+            Self::Recording => "no recordings here: open a folder on the left",
+        }
+    }
+
     /// Whether the folder itself may be chosen.
     pub fn takes(self, folder: &Path, files: usize) -> bool {
         match self {

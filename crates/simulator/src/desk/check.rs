@@ -343,7 +343,7 @@ impl Check {
         let notes = self.case.notes.iter().map(|note| Item::Note(printable(note)));
         head.extend(notes);
         Page {
-            title: format!("Check {}", printable(&self.name)),
+            title: format!("Check: {}", printable(&self.name)),
             line: "Right and left, the fit of CT and MRI, the tissue labels, the place of the opening".into(),
             columns: vec![self.slices_part(), head],
             foot: vec![
@@ -351,6 +351,7 @@ impl Check {
                 Item::button("Back to the start page", "the opening is kept", Action::Home),
             ],
             escape: Some(Action::Home),
+            ..Page::default()
         }
     }
 
@@ -388,11 +389,23 @@ impl Check {
             let found = |class: &TissueClass| brain.classes.data.contains(&class.code());
             let names = TissueClass::ALL.into_iter().filter(found).map(|class| {
                 let colour = COLOURS.get(usize::from(class.code()).wrapping_sub(1)).copied().unwrap_or([255; 3]);
-                Item::Label(class.name().into(), colour)
+                Item::Label(called(class).into(), colour)
             });
             items.push(Item::Row(names.collect()));
         }
         items
+    }
+}
+
+/// Name of a class in words.
+fn called(class: TissueClass) -> &'static str {
+    match class.name() {
+        "white" => "white matter",
+        "grey" => "grey matter",
+        "basal-ganglia" => "basal ganglia",
+        "corpus-callosum" => "corpus callosum",
+        "soft-tumour" => "soft tumour",
+        other => other,
     }
 }
 

@@ -1,16 +1,18 @@
 //! A draft of the scene in the window while its session is still loading.
 //!
 //! # Practice
-//! It needs the skull of the cached case only, not the models that run, and is drawn with few rays
-//! until the session takes its place.
+//! It needs only the skull, of a cached case or of the CT once it is read, not the models that run,
+//! and is drawn with few rays until the session takes its place.
 
-use crate::case::cache::Cache;
 use crate::case::folder;
+use crate::case::opening::Opening;
 use crate::error::SessionError;
-use crate::progress::Progress;
+use crate::progress::{DraftSkull, Progress};
 use crate::show::picture::camera;
+use std::path::Path;
 use std::sync::Arc;
-use trepan_geometry::Pose;
+use std::sync::mpsc::Receiver;
+use trepan_geometry::{Pose, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_render::window::{Capture, Panel, Session, Stage, Start, WindowInput};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData, SliceLook};
@@ -40,16 +42,40 @@ impl Session for Draft {
     fn capture(&mut self, _: Capture, _: Image) {}
 }
 
-/// Shows the draft of a cached case until another session takes the window; returns whether there
-/// was one.
+/// The skull of a draft, and the camera that looks at it.
+pub(crate) struct Looked {
+    skull: DraftSkull,
+    camera: Camera,
+}
+
+impl Looked {
+    /// The skull of a cached case, seen over its opening.
+    pub fn cached(folder: &Path) -> Result<Option<Self>, SessionError> {
+        let of = |(skull, opening): (_, Opening)| Self { skull, camera: camera(&opening.into()) };
+        Ok(folder::draft_skull(folder)?.map(of))
+    }
+
+    /// The skull of a CT that is being read, seen from the upper right front; `None` if it does not
+    /// come.
+    pub fn read(from: &Receiver<DraftSkull>) -> Option<Self> {
+        let skull = from.recv().ok()?;
+        let place = |share: f64| {
+            let voxel = glam::DVec3::from_array(skull.hu.dims.map(|n| share * n.saturating_sub(1) as f64));
+            skull.hu.world_from_voxel.transform_point3(voxel).as_vec3()
+        };
+        let size_mm = place(0.0).distance(place(1.0));
+        let camera = Camera::viewed_from(place(0.5), Vec3::new(0.6, 0.8, 0.5), 1.2 * size_mm);
+        Some(Self { skull, camera })
+    }
+}
+
+/// Shows a draft until another session takes the window; returns whether it came to that.
 pub(crate) fn show(
-    (cache, hash): (&Cache, &str),
+    Looked { skull, camera }: Looked,
     name: String,
     device: Result<Gpu, GpuError>,
     (stage, loading): (&Stage, &Progress),
 ) -> Result<bool, SessionError> {
-    let Some(folder) = cache.find(hash) else { return Ok(false) };
-    let Some(skull) = folder::draft_skull(&folder)? else { return Ok(false) };
     let bone = BoneVolume::new(&skull.hu, skull.isovalue_hu).map_err(|fault| SessionError::Case(fault.to_string()))?;
     let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None };
     // A software driver needs seconds to compile its programs.
@@ -57,7 +83,7 @@ pub(crate) fn show(
     let mut painter =
         if by_processor { Painter::by_processor(&data, SIZE)? } else { Painter::on(device, &data, SIZE)? };
     painter.set_quality(true, DETAIL)?;
-    let start = Start { detail: DETAIL, ..Start::with(camera(&skull.opening.into()), Pose::IDENTITY) };
+    let start = Start { detail: DETAIL, ..Start::with(camera, Pose::IDENTITY) };
     // The session itself may be in the window already, or loading was given up.
     if loading.is_over() {
         return Ok(false);

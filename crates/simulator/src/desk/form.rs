@@ -1,5 +1,6 @@
 //! What is filled in on the start page, and the options that follow from it.
 
+use crate::desk::language::Languages;
 use crate::desk::settings::{Recent, Settings, Source, sessions};
 use crate::error::SessionError;
 use crate::options::Options;
@@ -18,6 +19,8 @@ pub(crate) struct Form {
     pub case: Recent,
     /// Name of the session; empty for none.
     pub session: String,
+    /// Languages of the window.
+    pub languages: Languages,
     /// Devices of this machine.
     pub devices: Vec<Listed>,
 }
@@ -32,7 +35,7 @@ impl Form {
         let settings = Settings::read();
         let usual = Recent { name: built_in.unwrap_or("built-in case").into(), ..Recent::default() };
         let case = settings.recent.first().cloned().unwrap_or(usual);
-        Self { settings, case, ..Self::default() }
+        Self { settings, case, languages: Languages::list(), ..Self::default() }
     }
 
     /// Names of the devices, as `--device` takes them, with what the page shows.

@@ -30,7 +30,7 @@ pub(crate) struct Job {
 
 /// Seconds of each stage of loading where nothing was measured yet, numerical: for a case of a head
 /// on two cores.
-const USUAL_S: [(&str, f64); 13] = [
+pub(super) const USUAL_S: [(&str, f64); 13] = [
     ("looking at the images", 0.5),
     ("reading the CT", 1.0),
     ("reading the MRI", 1.0),
@@ -81,6 +81,7 @@ impl Job {
 
     /// Waits for the end. Keeps how long each stage took.
     pub fn end(self, settings: &mut Settings) -> Result<Done, SessionError> {
+        self.progress.end_wait();
         let (stages, _) = self.progress.so_far();
         for pair in stages.windows(2).filter(|_| self.is_running()) {
             let seconds = (pair[1].1 - pair[0].1) * 1e-3;

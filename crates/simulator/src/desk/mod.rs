@@ -10,8 +10,12 @@ mod browse;
 mod check;
 mod draft;
 mod form;
+#[cfg(test)]
+mod gallery;
 mod job;
+mod language;
 mod pages;
+mod pictures;
 mod results;
 mod settings;
 mod state;
@@ -23,7 +27,7 @@ use crate::options::Options;
 use crate::program::Program;
 use crate::run::stop::Stop;
 use crate::show::driver;
-use crate::{Inputs, desk::state::Desk};
+use crate::{Inputs, desk::language::Languages, desk::state::Desk};
 use trepan_render::window;
 
 /// Runs the program in a window until it is closed; returns what the last session came to.
@@ -34,6 +38,11 @@ pub(crate) fn run(program: Program, options: Options, built_in: Inputs) -> Optio
     };
     let device = driver::open();
     let (stage, offers) = window::stage();
+    let languages = Languages::list();
+    if let Some(code) = options.language.as_deref().filter(|code| !languages.codes().any(|known| known == *code)) {
+        let known = languages.codes().collect::<Vec<_>>().join(", ");
+        return Some(Err(SessionError::Usage(format!("--language: there is no language {code}; give one of {known}"))));
+    }
     let starts = options.names_no_session();
     let desk = Desk::new(program, options, built_in, (stage, device.clone()), stop);
     let desk = if starts { desk } else { desk.begin_directly() };

@@ -3,15 +3,16 @@
 use crate::desk::action::Action;
 use crate::desk::browse::{Folder, Goal};
 use crate::desk::form::Form;
+use crate::desk::pictures::Numbered;
 use crate::desk::settings::{Recent, Source};
 use crate::error::SessionError;
-use crate::printable::printable;
+use crate::printable::{capital, printable};
 use crate::program::Program;
 use std::path::{Path, PathBuf};
-use trepan_render::window::{Amount, Choosable, Item, Page};
+use trepan_render::window::{Amount, Choosable, Item, Page, Picture};
 
 /// The first page.
-pub(crate) fn start(program: Program, form: &Form) -> Page<Action> {
+pub(crate) fn start(program: Program, form: &Form, picture: Option<Numbered>) -> Page<Action> {
     let begin = match form.lacks(program) {
         None => Item::main("Start the operation", "loads the case and begins", Action::Begin),
         Some(why) => Item::closed("Start the operation", why),
@@ -25,9 +26,9 @@ pub(crate) fn start(program: Program, form: &Form) -> Page<Action> {
     Page {
         title: "Trepan".into(),
         line: format!("{}: choose a case and start", what(program)),
-        columns: vec![case(form), session(program, form), more(program)],
+        columns: vec![case(form, picture), session(program, form), more(program, form)],
         foot: [begin, check, chosen].into_iter().chain(lacks).collect(),
-        escape: None,
+        ..Page::default()
     }
 }
 
@@ -39,9 +40,21 @@ fn what(program: Program) -> &'static str {
     }
 }
 
-fn case(form: &Form) -> Vec<Item<Action>> {
-    let mut items = vec![
-        Item::Heading("Case".into()),
+/// Largest height of the picture of a case, points.
+const PICTURE: f32 = 190.0;
+
+fn case(form: &Form, picture: Option<Numbered>) -> Vec<Item<Action>> {
+    let shown = |image| Picture {
+        name: "picture of the case".into(),
+        image,
+        height: PICTURE,
+        letters: Vec::new(),
+        clicked: None,
+        dragged: None,
+    };
+    let mut items = vec![Item::Heading("Case".into())];
+    items.extend(picture.map(shown).map(Item::Picture));
+    items.extend([
         Item::Row(vec![
             Item::button("Built-in case", "a head that comes with the program", Action::BuiltIn),
             Item::button("Open CT...", Goal::Ct.line(), Action::Browse(Goal::Ct)),
@@ -49,7 +62,7 @@ fn case(form: &Form) -> Vec<Item<Action>> {
             Item::button("Open case folder...", Goal::Case.line(), Action::Browse(Goal::Case)),
         ]),
         Item::Note("Or drop files and folders on this window.".into()),
-    ];
+    ]);
     items.extend(chosen(&form.case));
     if !form.settings.recent.is_empty() {
         items.push(Item::Heading("Recent cases".into()));
@@ -113,7 +126,7 @@ fn recent(at: usize, recent: &Recent) -> Item<Action> {
     };
     let hash = recent.hash.get(..8).unwrap_or("not built yet");
     Item::Row(vec![
-        Item::button(printable(&recent.name), "chooses this case", Action::Recent(at)),
+        Item::named(printable(&recent.name), "chooses this case", Action::Recent(at)),
         Item::Note(format!("{kind}, {hash}")),
         Item::button("x", "takes it off this list; its files stay", Action::Forget(at)),
     ])
@@ -137,19 +150,20 @@ fn session(program: Program, form: &Form) -> Vec<Item<Action>> {
         Item::Choice("Quality".into(), Form::qualities(), form.quality(), Action::Quality),
     ];
     if program.has_bone() {
-        let name =
-            if settings.flap_mm > 0.0 { "planned flap, mm across" } else { "planned flap, mm across; 0: a burr hole" };
+        let name = if settings.flap_mm > 0.0 { "mm across: a flap" } else { "mm across: a burr hole, no flap" };
+        items.push(Item::Note("Planned flap".into()));
         let amount = Amount { name: name.into(), value: settings.flap_mm, range: [0.0, 90.0], step: 2.0 };
         items.push(Item::Amount(amount, Action::Flap));
     }
     items
 }
 
-fn more(program: Program) -> Vec<Item<Action>> {
+fn more(program: Program, form: &Form) -> Vec<Item<Action>> {
     let first = match program.has_bone() {
         true => Item::button("Guided first operation", "step by step, about two minutes", Action::Lesson(0)),
         false => Item::closed("Guided first operation", "it drills: use integrated or craniotomy"),
     };
+    let language = form.languages.place(&form.settings.language);
     vec![
         Item::Heading("Learn".into()),
         first,
@@ -157,9 +171,10 @@ fn more(program: Program) -> Vec<Item<Action>> {
         Item::Heading("Look back".into()),
         Item::button("Sessions...", "results, reports and replays of all sessions", Action::Sessions),
         Item::button("Replay a recording...", Goal::Recording.line(), Action::Browse(Goal::Recording)),
-        Item::Heading("Keys".into()),
+        Item::Heading("Window".into()),
+        Item::Choice("Language".into(), form.languages.choosable(), language, Action::Language),
         Item::Note("F1 in a session lists all keys. Q ends it and writes its report.".into()),
-        Item::button("Quit", "closes the window", Action::Close),
+        Item::Row(vec![Item::button("Quit", "closes the window", Action::Close)]),
     ]
 }
 
@@ -169,10 +184,10 @@ pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action>
     let up = path.parent().map(|up| Item::button("Up", "the folder above", Action::Into(up.into())));
     let home = std::env::home_dir().map(|home| Item::button("Home", "your own folder", Action::Into(home)));
     let top = Item::button("Computer", "the top of all folders", Action::Into(PathBuf::from("/")));
-    let mut places: Vec<Item<Action>> = up.into_iter().chain(home).chain([top]).collect();
-    places.push(Item::Field("Folder".into(), written.into(), "a path".into(), Action::Path));
+    let places: Vec<Item<Action>> = up.into_iter().chain(home).chain([top]).collect();
+    let written = Item::Field("Folder".into(), written.into(), "a path".into(), Action::Path);
     let entry = |name: &String, does: fn(PathBuf, Goal) -> Action| {
-        Item::button(printable(name), String::new(), does(path.join(name), goal))
+        Item::named(printable(name), String::new(), does(path.join(name), goal))
     };
     let folders = folder.folders.iter().map(|name| entry(name, |path, _| Action::Into(path))).collect::<Vec<_>>();
     let files = folder.files.iter().map(|name| entry(name, |path, goal| Action::Take(goal, path))).collect::<Vec<_>>();
@@ -184,36 +199,41 @@ pub(crate) fn browse(goal: Goal, folder: &Folder, written: &str) -> Page<Action>
     } else if goal != Goal::Recording {
         foot.push(Item::closed("Use this folder", goal.line()));
     }
-    foot.push(Item::button("Back", "chooses nothing", Action::Home));
+    foot.push(Item::button("Cancel", "chooses nothing", Action::Home));
     foot.extend(folder.fault.clone().map(Item::Note));
-    let of_folders =
-        [Item::Row(places), Item::Heading(format!("Folders: {}", folders.len()))].into_iter().chain(folders);
-    let of_files = [Item::Heading(format!("Files: {count}"))].into_iter().chain(files);
+    let of_folders = [Item::Row(places), written, Item::Heading("Folders".into())].into_iter().chain(folders);
+    let none = files.is_empty().then(|| Item::Note(goal.none().into()));
+    let of_files = [Item::Heading("Files".into())].into_iter().chain(none).chain(files);
     Page {
         title: goal.title().into(),
         line: goal.line().into(),
         columns: vec![of_folders.collect(), of_files.collect()],
         foot,
         escape: Some(Action::Home),
+        steady: true,
     }
 }
 
 /// The page on which a dropped file or folder gets its purpose.
 pub(crate) fn sort(path: &Path) -> Page<Action> {
-    let take = |name: &str, goal| Item::button(name, String::new(), Action::Take(goal, path.into()));
+    let take = |name: &str, hint: &str, goal| Item::main(name, hint, Action::Take(goal, path.into()));
     Page {
-        title: "What is it?".into(),
+        title: "What did you drop here?".into(),
         line: described(path),
-        columns: vec![vec![Item::Row(vec![take("The CT", Goal::Ct), take("The MRI", Goal::Mri)])]],
-        foot: vec![Item::button("Back", "takes nothing", Action::Home)],
+        columns: vec![vec![Item::Row(vec![
+            take("The CT", "shows the skull", Goal::Ct),
+            take("The MRI", "shows the brain", Goal::Mri),
+        ])]],
+        foot: vec![Item::button("Cancel", "takes nothing", Action::Home)],
         escape: Some(Action::Home),
+        ..Page::default()
     }
 }
 
 /// The page while a session is loading, or over a draft of its scene.
 pub(crate) fn loading(name: &str, (share, line): (f32, String)) -> Page<Action> {
     Page {
-        title: format!("Loading {}", printable(name)),
+        title: format!("Loading: {}", printable(name)),
         line: String::new(),
         columns: vec![vec![
             Item::Progress(share, line),
@@ -221,6 +241,7 @@ pub(crate) fn loading(name: &str, (share, line): (f32, String)) -> Page<Action> 
         ]],
         foot: Vec::new(),
         escape: Some(Action::Cancel),
+        ..Page::default()
     }
 }
 
@@ -258,6 +279,7 @@ pub(crate) fn fault(fault: &SessionError, source: &Source) -> Page<Action> {
             Item::button("Quit", "closes the window", Action::Close),
         ],
         escape: Some(Action::Home),
+        ..Page::default()
     }
 }
 
@@ -265,11 +287,6 @@ pub(crate) fn fault(fault: &SessionError, source: &Source) -> Page<Action> {
 fn split(text: &str) -> (&str, Option<&str>) {
     let at = text.rfind("; ").or_else(|| text.rfind(": give")).or_else(|| text.rfind(": name"));
     at.map_or((text, None), |at| (&text[..at], Some(text[at + 1..].trim())))
-}
-
-fn capital(text: impl AsRef<str>) -> String {
-    let mut letters = text.as_ref().chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]
@@ -296,7 +313,7 @@ mod tests {
         form.settings.recent = vec![form.case.clone()];
         let broken = SessionError::Case("/data/Doe^Jane/ct: no DICOM picture lies in it; give another".into());
         assert!(!format!("{:?}", fault(&broken, &form.case.source)).contains("Jane"));
-        let page = start(Program::Integrated, &form);
+        let page = start(Program::Integrated, &form, None);
         assert!(!format!("{page:?}").contains("Jane"));
         assert!(format!("{:?}", page.foot).contains("does: None"), "an MRI is missing");
     }

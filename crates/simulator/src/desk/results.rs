@@ -23,18 +23,22 @@ pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Act
     items.extend([verdict, Item::Table(table(&debrief))]);
     if debrief.earlier > 0 {
         items.push(Item::Note(format!(
-            "compared with {} earlier sessions of {}",
+            "compared with {} earlier sessions: {}",
             debrief.earlier,
             printable(&session.person)
         )));
     }
-    items.extend(
-        debrief.curves.iter().map(|(name, values)| Item::Curve(format!("{name}, session by session"), values.clone())),
-    );
+    let mut columns = vec![items];
+    if !debrief.curves.is_empty() {
+        let curve =
+            |(name, values): &(String, Vec<f64>)| Item::Curve(format!("{name}, session by session"), values.clone());
+        let heading = Item::Heading("Learning curve".into());
+        columns.push([heading].into_iter().chain(debrief.curves.iter().map(curve)).collect());
+    }
     Page {
         title: "Result".into(),
-        line: format!("{}, case {}, device {}", printable(&session.title), session.case, session.device),
-        columns: vec![items],
+        line: format!("{}, {}, {}", when(&session.title), session.case, session.device),
+        columns,
         foot: vec![
             home(),
             Item::button("Open the report", "in the browser, where it can be printed", Action::Report(folder.into())),
@@ -42,16 +46,34 @@ pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Act
             Item::button("All sessions", "", Action::Sessions),
         ],
         escape: Some(Action::Home),
+        ..Page::default()
+    }
+}
+
+/// Date, time and name of a session, from the name of its folder.
+fn when(title: &str) -> String {
+    let title = printable(title);
+    match title.split_once('T') {
+        Some((date, rest)) if rest.len() >= 8 && rest.is_char_boundary(8) => {
+            let (time, name) = rest.split_at(8);
+            let name = name.strip_prefix('-').map_or(String::new(), |name| format!(", {name}"));
+            format!("{date} {}{name}", time[..5].replace('-', ":"))
+        }
+        _ => title,
     }
 }
 
 fn table(debrief: &Debrief) -> Vec<Vec<String>> {
-    let heading = ["measure", "value", "limit", "kept", "mean of earlier"].map(String::from);
+    let heading = ["measure", "value", "limit", "kept", "earlier mean"].map(String::from);
     let row = |row: &Row| {
         let kept = row.passed.map_or("", |passed| if passed { "yes" } else { "no" });
         vec![row.what.clone(), row.value.clone(), row.limit.clone(), kept.into(), row.earlier.clone()]
     };
-    [heading.into()].into_iter().chain(debrief.rows.iter().map(row)).collect()
+    let rows: Vec<Vec<String>> = debrief.rows.iter().map(row).collect();
+    // A column that says nothing is left out.
+    let says: Vec<bool> = (0..heading.len()).map(|at| rows.iter().any(|row| !row[at].is_empty())).collect();
+    let of = |row: Vec<String>| row.into_iter().zip(&says).filter(|(_, says)| **says).map(|(cell, _)| cell).collect();
+    [heading.into()].into_iter().chain(rows).map(of).collect()
 }
 
 fn home() -> Item<Action> {
@@ -59,16 +81,17 @@ fn home() -> Item<Action> {
 }
 
 /// The page of all sessions.
-pub(crate) fn list(kept: &[Kept]) -> Page<Action> {
+pub(crate) fn list(kept: &[Kept], lessons: &[Lesson]) -> Page<Action> {
     let row = |session: &Kept| {
-        let (title, folder) = (printable(&session.title), session.folder.clone());
-        let more = [&session.person, &session.lesson].into_iter().filter(|text| !text.is_empty());
+        let (title, folder) = (when(&session.title), session.folder.clone());
+        let lesson = lessons.iter().find(|lesson| lesson.name == session.lesson).map(|lesson| &lesson.title);
+        let more = [Some(&session.person), lesson].into_iter().flatten().filter(|text| !text.is_empty());
         let more: String = more.map(|text| format!(", {}", printable(text))).collect();
         Item::Row(vec![
             Item::button(title, "its result", Action::Result(folder.clone())),
-            Item::Note(format!("{}, {}, {}{more}", session.program, session.case, session.device)),
             Item::button("Report", "in the browser", Action::Report(folder.clone())),
             Item::button("Replay", "shows it again", Action::Replay(folder)),
+            Item::Note(format!("{}, {}, {}{more}", session.program, session.case, session.device)),
         ])
     };
     let rows: Vec<_> = kept.iter().map(row).collect();
@@ -79,6 +102,7 @@ pub(crate) fn list(kept: &[Kept]) -> Page<Action> {
         columns: vec![rows.into_iter().chain(none).collect()],
         foot: vec![home()],
         escape: Some(Action::Home),
+        ..Page::default()
     }
 }
 
@@ -94,6 +118,7 @@ pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: O
             (false, count) => format!("not passed yet, {count} tries"),
         };
         let begin = match closed {
+            None if passed => Item::button("Begin", "once more", Action::Lesson(at)),
             None => Item::main("Begin", lesson.about.clone(), Action::Lesson(at)),
             Some(why) => Item::closed("Begin", why),
         };
@@ -107,7 +132,8 @@ pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: O
         title: "Lessons".into(),
         line: "Steps while you operate, pass marks at the end; with the case and the device of the start page".into(),
         columns: vec![lessons.iter().enumerate().flat_map(lesson).collect()],
-        foot: vec![home()],
+        foot: vec![Item::button("Back to the start page", "your choices are kept", Action::Home)],
         escape: Some(Action::Home),
+        ..Page::default()
     }
 }

@@ -22,6 +22,8 @@ const MOST_RECENT: usize = 12;
 pub(crate) struct Settings {
     /// Who operates, as the person wants to be called; empty for nobody.
     pub person: String,
+    /// Short name of the window's language; empty for English.
+    pub language: String,
     /// Name of the device; empty for the mouse.
     pub device: String,
     /// The tool at the start, by its place in the tray.
@@ -42,6 +44,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             person: String::new(),
+            language: String::new(),
             device: String::new(),
             tool: 0,
             quality: "auto".into(),
@@ -63,6 +66,8 @@ pub(crate) struct Recent {
     pub hash: String,
     /// Where it comes from.
     pub source: Source,
+    /// A picture of its skull, of the session before.
+    pub picture: Option<PathBuf>,
     /// Place of the opening, RAS mm, if the user chose one.
     pub opening: Option<[f32; 3]>,
     /// Line of the flap that the user drew on the skull, RAS mm; empty without one.

@@ -8,10 +8,11 @@ use crate::case::choice::case_to_check;
 use crate::desk::action::Action;
 use crate::desk::browse::{self, Folder, Goal};
 use crate::desk::check::Check;
-use crate::desk::draft;
+use crate::desk::draft::{self, Looked};
 use crate::desk::form::Form;
 use crate::desk::job::{Done, Job, Work};
 use crate::desk::pages;
+use crate::desk::pictures::Pictures;
 use crate::desk::results;
 use crate::desk::settings::{Recent, Source, sessions};
 use crate::error::SessionError;
@@ -27,7 +28,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::Listed;
-use trepan_render::window::{Host, Page, Shown, Stage};
+use trepan_render::window::{Host, Page, Shown, Stage, speak};
 
 /// What the window shows.
 enum View {
@@ -45,22 +46,26 @@ enum View {
     Closed,
 }
 
+/// Picture of a session before it begins, in its folder.
+const PICTURE: &str = "frames/frame-before.png";
+
 /// The program behind the window.
 pub(crate) struct Desk {
     program: Program,
     base: Options,
     built_in: Inputs,
-    form: Form,
+    pub(super) form: Form,
     view: View,
     stage: Stage,
     device: Result<Gpu, GpuError>,
     /// Whether the program was started for one session.
     direct: bool,
-    last: Option<Result<Done, SessionError>>,
+    pub(super) last: Option<Result<Done, SessionError>>,
     /// Dropped files and folders that still need a purpose.
     waiting: Vec<PathBuf>,
     devices: Receiver<Vec<Listed>>,
     stop: Stop,
+    pictures: Pictures,
 }
 
 impl Desk {
@@ -75,9 +80,25 @@ impl Desk {
         let (sender, devices) = channel();
         // Looking for hardware may wait for its drivers. Nobody listens once the window is closed.
         std::thread::spawn(move || _ = sender.send(trepan_haptics::list()));
-        let form = Form::read(built_in.name);
-        let (view, direct, last, waiting) = (View::Start, false, None, Vec::new());
-        Self { program, base, built_in, form, view, stage, device, direct, last, waiting, devices, stop }
+        let mut form = Form::read(built_in.name);
+        form.settings.language = base.language.clone().unwrap_or(form.settings.language);
+        speak(form.languages.get(&form.settings.language));
+        let (view, direct, last) = (View::Start, false, None);
+        Self {
+            program,
+            base,
+            built_in,
+            form,
+            view,
+            stage,
+            device,
+            direct,
+            last,
+            waiting: Vec::new(),
+            devices,
+            stop,
+            pictures: Pictures::default(),
+        }
     }
 
     /// Begins the session, or the batch of replays, that the flags name.
@@ -123,13 +144,17 @@ impl Desk {
         };
         let Recent { name, hash, .. } = self.form.case.clone();
         let cache = Cache::of(&options.patient).ok();
-        let again = cache.as_ref().is_some_and(|cache| !hash.is_empty() && cache.find(&hash).is_some());
-        let progress = Progress::default();
-        if let Some(cache) = cache.filter(|_| again && self.program.has_bone()) {
+        let cached = cache.filter(|_| !hash.is_empty()).and_then(|cache| cache.find(&hash));
+        let (again, progress) = (cached.is_some(), Progress::default());
+        if self.program.has_bone() {
             let (stage, device, name) = (self.stage.clone(), self.device.clone(), name.clone());
-            let loading = progress.clone();
+            let (loading, read) = (progress.clone(), progress.awaits_skull());
             std::thread::spawn(move || {
-                let shown = draft::show((&cache, &hash), name, device, (&stage, &loading));
+                let looked = cached.map_or_else(|| Ok(Looked::read(&read)), |folder| Looked::cached(&folder));
+                let shown = looked.and_then(|looked| match looked {
+                    Some(looked) => draft::show(looked, name, device, (&stage, &loading)),
+                    None => Ok(false),
+                });
                 shown.err().into_iter().for_each(|fault| tracing::debug!("no draft of the scene: {fault}"));
             });
         }
@@ -148,6 +173,7 @@ impl Desk {
             Ok(Done::Batch(_) | Done::Case(_)) => View::Start,
             Ok(Done::Session(ended)) => {
                 self.form.case.hash = ended.case.clone().unwrap_or_default();
+                self.form.case.picture = Some(ended.out.join(PICTURE));
                 self.form.settings.remember(self.form.case.clone());
                 View::Page(Box::new(results::page(&ended.out, &self.kept(), &lessons())))
             }
@@ -276,7 +302,9 @@ impl Host for Desk {
             self.take(done);
         }
         match &self.view {
-            View::Start => Shown::Page(Box::new(pages::start(self.program, &self.form))),
+            View::Start => {
+                Shown::Page(Box::new(pages::start(self.program, &self.form, self.pictures.of(&self.form.case))))
+            }
             View::Browse(goal, folder, written) => Shown::Page(Box::new(pages::browse(*goal, folder, written))),
             View::Page(page) => Shown::Page(page.clone()),
             View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault))),
@@ -323,6 +351,10 @@ impl Host for Desk {
             Action::Tool(at) => form.settings.tool = at,
             Action::Quality(at) => {
                 form.settings.quality = Form::qualities().get(at).map(|q| q.name.clone()).unwrap_or_default();
+            }
+            Action::Language(at) => {
+                form.settings.language = form.languages.codes().nth(at).unwrap_or_default().into();
+                speak(form.languages.get(&form.settings.language));
             }
             Action::Flap(mm) => form.settings.flap_mm = mm,
             Action::Browse(goal) => {
@@ -436,7 +468,7 @@ impl Desk {
             Action::Check => self.check(),
             Action::OpenAt(_) | Action::Drag(_) | Action::Draw(_) | Action::RoundFlap => self.look(action),
             Action::Blend(_) | Action::Slide(..) => self.look(action),
-            Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept()))),
+            Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept(), &lessons()))),
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
             }

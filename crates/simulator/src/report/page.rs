@@ -159,7 +159,7 @@ fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 6], Sessio
 
 /// Paths of the timings in a summary; scores and the rest have their own tables.
 const TIMINGS: &str = "asked_hz rate_hz late_ticks held_ticks tick_us solver.dt_ms solver.step_us solver.collision_us \
-                       solver.real_time_factor frames fps";
+                       solver.real_time_factor frames fps moving";
 /// Paths of the scores in a summary.
 const SCORES: &str = "scores bone_removed_mm3 plan cut_off force_n";
 

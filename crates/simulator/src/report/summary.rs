@@ -74,6 +74,8 @@ pub struct Summary {
     pub frames: u64,
     /// Pictures per second while rendering.
     pub fps: f64,
+    /// Pictures of the window while something moved; `null` without.
+    pub moving: Option<MovingSummary>,
     /// Comparison with the recording, in a replay.
     pub replay: Option<Replayed>,
     /// Records that did not fit into the ring buffers.
@@ -82,6 +84,17 @@ pub struct Summary {
     pub remarks: Vec<String>,
     /// The machine.
     pub machine: Machine,
+}
+
+/// Pictures of the window while something moved.
+#[derive(Clone, Debug, Serialize)]
+pub struct MovingSummary {
+    /// Number of pictures.
+    pub frames: u64,
+    /// Time from one picture to the next, µs.
+    pub interval_us: Quantiles,
+    /// Mean fraction of the 3-D view's pixels along an edge, 0 to 1.
+    pub mean_detail: f64,
 }
 
 /// A phase and when it began.

@@ -93,6 +93,8 @@ pub(crate) struct View {
     pub spindle: f32,
     /// Bone removed so far, mm³.
     pub removed_mm3: f64,
+    /// Whether the bone is open, or need not be: only then a tool for the brain can be taken.
+    pub bone_open: bool,
     /// Numbers of ticks, late ticks and ticks with a stale patch.
     pub counts: [u64; 3],
     /// Whether the operation is over.
@@ -116,6 +118,7 @@ impl View {
             news: None,
             spindle: 0.0,
             removed_mm3: 0.0,
+            bone_open: true,
             counts: [0; 3],
             finished: false,
         }
@@ -281,6 +284,7 @@ impl Ticks {
             news: self.news,
             spindle: stage.spindle_share(&tick.record),
             removed_mm3: stage.scores().bone_removed_mm3,
+            bone_open: stage.is_open(),
             counts: [self.count, self.late, self.held],
             finished,
         }

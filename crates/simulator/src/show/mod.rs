@@ -4,7 +4,7 @@ mod colours;
 pub(crate) mod driver;
 pub(crate) mod graphics;
 mod keep;
-mod notice_text;
+pub(crate) mod notice_text;
 pub(crate) mod picture;
 pub(crate) mod player;
 mod raycast;

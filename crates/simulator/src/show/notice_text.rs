@@ -1,10 +1,11 @@
 //! Texts of the window's panel, live and in a replay: phase, tool, forces, warnings.
 
+use crate::printable::capital;
 use crate::program::{Phase, Program, called};
 use crate::run::View;
 use crate::stages::notice::{Notice, Warning};
 use crate::uncertainty::Band;
-use trepan_geometry::Buttons;
+use trepan_geometry::{Buttons, Tool};
 use trepan_render::window::{Choice, Panel, Sound};
 
 /// Time for which a notice is shown, ms.
@@ -49,7 +50,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let second = view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length())));
     Panel {
         case: case.into(),
-        phase: sample.phase().name().into(),
+        phase: ["Craniotomy", "Brain"][sample.phase() as usize].into(),
         tool: called(&sample.tool),
         drilling: sample.drilling,
         sound: Sound {
@@ -59,7 +60,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         },
         force_n: view.force.length(),
         force_limit_n: view.force_limit_n,
-        choices: vec![tray(program, sample.slot)],
+        choices: vec![tray(program, view)],
         values: values.into_iter().chain(band).chain(second).collect(),
         task: task.into(),
         no_drill: (!sample.tool.kind.cuts())
@@ -80,9 +81,12 @@ fn news(view: &View) -> Vec<String> {
 }
 
 /// Returns the choice of tools, with the present one selected.
-fn tray(program: Program, slot: usize) -> Choice {
-    let options = program.tray().iter().map(|tool| (called(tool), true)).collect();
-    Choice { name: "Tool".into(), options, chosen: slot, tools: program.tray().to_vec() }
+fn tray(program: Program, view: &View) -> Choice {
+    let closed =
+        |tool: &Tool| Phase::of(tool) == Phase::Brain && view.sample.phase() != Phase::Brain && !view.bone_open;
+    let why_not = |tool: &Tool| closed(tool).then(|| Notice::NOT_OPEN.into());
+    let options = program.tray().iter().map(|tool| (called(tool), why_not(tool))).collect();
+    Choice { name: "Tool".into(), options, chosen: view.sample.slot, tools: program.tray().to_vec() }
 }
 
 /// Returns the active warnings.
@@ -101,8 +105,7 @@ fn technical(bits: u32) -> impl Iterator<Item = Warning> {
 }
 
 fn in_words(notice: Notice) -> String {
-    let (kind, text) = notice.words();
-    format!("{kind}: {text}")
+    capital(notice.words().1)
 }
 
 /// Returns a hint on what to do next.
@@ -153,6 +156,15 @@ mod tests {
         assert!(shown(&view));
         view.depth_mm[1] = 0.0;
         assert!(!shown(&view));
+    }
+
+    #[test]
+    fn tools_for_the_brain_wait_until_the_bone_is_open() {
+        let closed = |bone_open: bool| {
+            let panel = panel("c", Program::Integrated, &View { bone_open, ..view(0) });
+            panel.choices[0].options.iter().filter(|(_, why_not)| why_not.is_some()).count()
+        };
+        assert_eq!((closed(false), closed(true)), (2, 0), "probe and spatula");
     }
 
     #[test]

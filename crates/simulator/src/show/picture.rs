@@ -4,9 +4,10 @@
 use crate::SessionError;
 use crate::case::opening::eye;
 use crate::report::page::Shot;
+use crate::report::summary::MovingSummary;
 use crate::run::clock::Clock;
 use crate::run::stop::Stop;
-use crate::run::{RenderInputs, View};
+use crate::run::{RenderInputs, Times, View};
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::stages::second_hand::SecondHand;
@@ -14,6 +15,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
+use trepan_render::window::Pace;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 
 /// Half the height of a slice's view around the tool, mm.
@@ -34,10 +36,36 @@ pub(crate) struct Album {
     pub frames: u64,
     /// Time in which they were rendered, s.
     pub seconds: f64,
+    /// Those of a window in which something moved.
+    pub moving: Moving,
     /// Pictures for the report.
     pub shots: Vec<Shot>,
     /// Faults of rendering.
     pub faults: Vec<String>,
+}
+
+/// Intervals and detail of the pictures in which something moved.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Moving {
+    frames: u64,
+    intervals: Times,
+    details: f64,
+}
+
+impl Moving {
+    /// Adds a picture.
+    pub fn add(&mut self, pace: &Pace) {
+        self.frames += 1;
+        self.intervals.add_us(1e6 * pace.interval_s as f32);
+        self.details += f64::from(pace.detail);
+    }
+
+    /// Returns the summary; `None` without pictures.
+    pub fn summary(&self) -> Option<MovingSummary> {
+        let Self { frames, intervals, details } = self;
+        let mean_detail = details / *frames as f64;
+        (*frames > 0).then(|| MovingSummary { frames: *frames, interval_us: intervals.into(), mean_detail })
+    }
 }
 
 impl Album {

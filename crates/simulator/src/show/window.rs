@@ -16,8 +16,9 @@ use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
-use crate::show::picture::{Album, camera, frame, microscope, snap};
+use crate::show::picture::{Album, Moving, camera, frame, microscope, snap};
 use crate::show::raycast::Raycast;
+use crate::stages::notice::Notice;
 use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
@@ -84,7 +85,8 @@ impl Shown {
     pub fn panel(&self, view: &View, by_hand: bool) -> Panel {
         let mut panel = notice_text::panel(&self.case, self.program, view);
         if !by_hand {
-            panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
+            let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
+            options.for_each(|(_, why_not)| *why_not = Some(NOT_IN_HAND.into()));
         }
         panel
     }
@@ -214,11 +216,11 @@ pub(crate) fn run<S: window::Session + Send>(
     let start = Start::with(eye, at.sample.state.world_from_tool);
     let detail = opened.table.models.setup.picture.detail as f32;
     let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
-    let counted = Counted { session, pictures: 0, seconds: [0.0; 2] };
+    let counted = Counted { session, pictures: 0, seconds: [0.0; 2], moving: Moving::default() };
     opened.progress.run();
     let closed = opened.stage.run(painter, counted, start);
-    let (mut painter, Counted { session, pictures, seconds: [from, to] }) = (closed.renderer, closed.session);
-    (album.frames, album.seconds) = (album.frames + pictures, to - from);
+    let (mut painter, Counted { session, pictures, seconds: [from, to], moving }) = (closed.renderer, closed.session);
+    (album.frames, album.seconds, album.moving) = (album.frames + pictures, to - from, moving);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
@@ -234,6 +236,7 @@ struct Counted<S> {
     pictures: u64,
     /// Times of the first and the newest picture, s.
     seconds: [f64; 2],
+    moving: Moving,
 }
 
 impl<S: window::Session> window::Session for Counted<S> {
@@ -241,6 +244,7 @@ impl<S: window::Session> window::Session for Counted<S> {
         let first = if self.pictures == 0 { input.seconds } else { self.seconds[0] };
         self.seconds = [first, input.seconds];
         self.pictures += 1;
+        input.pace.iter().for_each(|pace| self.moving.add(pace));
         self.session.update(input)
     }
 
@@ -280,7 +284,7 @@ impl window::Session for Show {
         let flap = || Action {
             name: "Lift the flap, or put it back".into(),
             key: Some('f'),
-            why_not: self.no_flap.then(|| "no flap is planned: start with --flap and its diameter, mm".into()),
+            why_not: self.no_flap.then(|| Notice::NO_FLAP.into()),
             ..Action::default()
         };
         let mut panel = self.shown.panel(view, by_hand);
@@ -373,15 +377,18 @@ impl Lesson {
     }
 }
 
+/// Why no tool can be taken here.
+pub(crate) const NOT_IN_HAND: &str = "another device, a script or a recording moves the tool";
+
 /// Hint for a teacher.
-const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";
+pub(crate) const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";
 
 /// A teacher's switches: text, key and bit.
-const SWITCHES: [(&str, char, u32); 5] = [
+pub(crate) const SWITCHES: [(&str, char, u32); 5] = [
     ("Show the trainee my tool", 'g', TeacherRecord::GHOST),
     ("Mark the place of my tool", 'k', TeacherRecord::MARKER),
     ("Pause the trainee", 'j', TeacherRecord::PAUSE),
-    ("Take the drill's power", 'w', TeacherRecord::NO_POWER),
+    ("Take the drill's power", 'a', TeacherRecord::NO_POWER),
     ("Let the patient bleed", 'h', TeacherRecord::BLEEDING),
 ];
 
@@ -413,6 +420,7 @@ mod tests {
     use trepan_geometry::ToolState;
     use trepan_haptics::HapticDevice;
     use trepan_link::cell::cell;
+    use trepan_render::window::Pace;
 
     #[test]
     fn a_trainee_reads_the_requests() {
@@ -475,6 +483,7 @@ mod tests {
             playback: None,
             camera: Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0),
             seconds: 0.0,
+            pace: None,
         }
     }
 
@@ -495,12 +504,16 @@ mod tests {
 
     #[test]
     fn pictures_are_counted_with_the_time_from_the_first_to_the_newest() {
-        let mut counted = Counted { session: Blank, pictures: 0, seconds: [0.0; 2] };
+        let mut counted = Counted { session: Blank, pictures: 0, seconds: [0.0; 2], moving: Moving::default() };
         for picture in 0..=20 {
-            let input = WindowInput { seconds: 5.0 + 0.1 * f64::from(picture), ..input() };
+            let pace = (picture % 2 == 1).then_some(Pace { interval_s: 0.05, detail: 0.4 });
+            let input = WindowInput { seconds: 5.0 + 0.1 * f64::from(picture), pace, ..input() };
             window::Session::update(&mut counted, &input);
         }
         assert_eq!((counted.pictures, counted.seconds), (21, [5.0, 7.0]));
+        let moving = counted.moving.summary().expect("ten pictures moved");
+        assert_eq!(moving.frames, 10);
+        assert!((moving.interval_us.p50 - 5e4).abs() < 100.0 && (moving.mean_detail - 0.4).abs() < 1e-6, "{moving:?}");
     }
 
     #[test]

@@ -173,6 +173,23 @@ pub enum Hindrance {
 }
 
 impl Hindrance {
+    /// All reasons.
+    #[cfg(test)]
+    pub const ALL: [Self; 12] = [
+        Self::Tool,
+        Self::SecondTool,
+        Self::Pedal,
+        Self::BrainTool,
+        Self::FlapMoves,
+        Self::FlapAway,
+        Self::FlapThere,
+        Self::NoStroke,
+        Self::NothingUndone,
+        Self::Touches,
+        Self::UndoRuns,
+        Self::Forgotten,
+    ];
+
     /// Returns the text shown to the trainee.
     fn text(self) -> String {
         let text = match self {
@@ -208,11 +225,16 @@ pub struct Notice {
 }
 
 impl Notice {
+    /// Why no flap moves.
+    pub const NO_FLAP: &'static str = "no flap is planned: set its diameter on the start page, or give --flap";
+    /// Why no tool for the brain is taken.
+    pub const NOT_OPEN: &'static str = "the bone is not open: drill through it or lift the flap first";
+
     /// Returns kind and text, as recorded.
     pub fn words(&self) -> (&'static str, String) {
         match self.what {
             What::Phase(phase) => ("phase", format!("{} begins", phase.name())),
-            What::Taken(tool) => ("tool", format!("the {} is in the hand", called(&tool))),
+            What::Taken(tool) => ("tool", format!("in the hand: {}", called(&tool))),
             What::Warning(warning, true, value) => {
                 let Texts { name, text, unit } = warning.texts();
                 // Avoids -0.00.
@@ -227,8 +249,8 @@ impl Notice {
             What::NotRedone(why) => ("refused", format!("no stroke is redone: {}", why.text())),
             What::NotChanged => ("refused", format!("the tool stays in the hand: {}", Hindrance::Touches.text())),
             What::FlapWaits(why) => ("refused", format!("the flap stays: {}", why.text())),
-            What::NoFlap => ("refused", "no flap is planned: start with --flap and its diameter, mm".into()),
-            What::NotOpen => ("refused", "the bone is not open: drill through it or lift the flap first".into()),
+            What::NoFlap => ("refused", Self::NO_FLAP.into()),
+            What::NotOpen => ("refused", Self::NOT_OPEN.into()),
             What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
             What::FlapHangs => ("refused", "the flap is still attached to the skull: cut it free first".into()),
             What::FlapLifted(mm3) => ("flap", format!("the flap is lifted: {mm3:.0} mm3 of bone")),

@@ -31,7 +31,7 @@ impl HapticStage {
     }
 
     /// Whether the bone is open, or need not be.
-    fn is_open(&self) -> bool {
+    pub fn is_open(&self) -> bool {
         let lifted = self.flap.as_ref().is_some_and(Flap::is_away);
         lifted || self.bone.is_none() || self.holes > 0 || !self.config.opening_needed
     }
