@@ -46,9 +46,9 @@ fn a_person_opens_the_built_in_case_and_then_a_dicom_folder() {
 /// Middle of the picture at 1280 by 800, where the opening is.
 const MIDDLE: [f32; 2] = [374.0, 400.0];
 /// Buttons of the panel: "Draw the tool back", "Lift the flap, or put it back", "craniotome".
-const DRAW_BACK: [u32; 2] = [1135, 460];
-const LIFT: [u32; 2] = [1135, 546];
-const CRANIOTOME: [u32; 2] = [1135, 656];
+const DRAW_BACK: [u32; 2] = [1090, 567];
+const LIFT: [u32; 2] = [1135, 495];
+const CRANIOTOME: [u32; 2] = [1135, 466];
 /// Diameter of the flap, mm.
 const FLAP_MM: f32 = 16.0;
 
@@ -129,7 +129,6 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     person.goes_on();
     person.waits_for_session(1);
     let chart = Chart::of(&person);
-    eprintln!("calibrated at {:.0} s", person.tick().time_ms * 1e-3);
     let rim = |turn: f32| 0.5 * FLAP_MM * Vec2::from_angle(turn);
     person.points(chart.pixel(rim(0.0)));
     person.rests(1.5);
