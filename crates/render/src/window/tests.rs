@@ -161,7 +161,7 @@ fn the_panel_shows_the_sessions_data() {
         ..Panel::default()
     };
     let mut bench = Bench::with(panel);
-    let words = ["case composite", "Craniotomy", "drag the burr", "Force  1.25 N", "limit 3.3 N", "4.2 mm"];
+    let words = ["case composite", "Craniotomy", "Drag the burr", "Force  1.25 N", "limit 3.3 N", "4.2 mm"];
     assert!(words.iter().all(|words| bench.shows(words)));
     assert!(!bench.shows("Rate  999 Hz") && !bench.shows("3 / 4"), "folded away");
     bench.click("Engineering");
