@@ -1,141 +1,18 @@
 //! A scripted person with a mouse in a real window: the built-in case, then a DICOM folder by the
-//! dialogue. Needs Xvfb and xdotool; without them it says so and ends.
+//! dialogue; a burr hole; a flap. Needs Xvfb and xdotool; without them it says so and ends.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 #[path = "../../integrated/tests/dicom/mod.rs"]
 mod dicom;
+mod person;
 
+use glam::{Mat2, Quat, Vec2, Vec3};
+use person::Person;
 use std::fs;
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
+use trepan_link::wire::TickRecord;
 
-/// A display of 1280 by 800 pixels with the program on it.
-struct Person {
-    screen: Child,
-    program: Child,
-    display: String,
-    home: PathBuf,
-}
-
-impl Person {
-    /// Sits down in front of the program; `None` where the tools are missing.
-    fn sits_down(home: &Path, settings: &str) -> Option<Self> {
-        Command::new("xdotool").arg("version").output().ok()?;
-        Command::new("import").arg("-version").output().ok()?;
-        let mut screen = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x800x24"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .ok()?;
-        let mut number = String::new();
-        BufReader::new(screen.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        let display = format!(":{}", number.trim());
-        fs::create_dir_all(home.join("config")).unwrap();
-        fs::write(home.join("config/settings.json"), settings).unwrap();
-        let program = Command::new(env!("CARGO_BIN_EXE_craniotomy"))
-            .env("DISPLAY", &display)
-            .env("TREPAN_CONFIG", home.join("config"))
-            .env("TREPAN_SESSIONS", home.join("sessions"))
-            .env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"))
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let person = Self { screen, program, display, home: home.into() };
-        person.waits_for("the window", || !person.does("search --name Trepan").is_empty());
-        std::thread::sleep(Duration::from_secs(2));
-        // Without a window manager nobody else gives the window the keys.
-        person.does("search --name Trepan windowfocus");
-        Some(person)
-    }
-
-    /// Lets xdotool do something; returns what it printed.
-    fn does(&self, what: &str) -> Vec<u8> {
-        Command::new("xdotool").args(what.split(' ')).env("DISPLAY", &self.display).output().unwrap().stdout
-    }
-
-    fn clicks(&self, [x, y]: [u32; 2]) {
-        self.does(&format!("mousemove {x} {y}"));
-        std::thread::sleep(Duration::from_millis(300));
-        self.does("click 1");
-        std::thread::sleep(Duration::from_millis(700));
-    }
-
-    /// Middle of the button of the usual next step: the first large patch in its colour, sky blue.
-    fn main_button(&self) -> Option<[u32; 2]> {
-        let args = ["-window", "root", "-depth", "8", "rgb:-"];
-        let pixels = Command::new("import").args(args).env("DISPLAY", &self.display).output().ok()?.stdout;
-        let is_sky = |x: usize, y: usize| pixels.get(3 * (y * WIDTH + x)..).is_some_and(|rgb| rgb.starts_with(&SKY));
-        let is_patch = |x: usize, y: usize| (0..6).all(|n| is_sky(x + 6 * n, y) && is_sky(x, y + n));
-        let places = (0..pixels.len() / 3).map(|at| (at % WIDTH, at / WIDTH));
-        let (x, y) = places.filter(|(x, _)| x + 40 < WIDTH).find(|(x, y)| is_patch(*x, *y))?;
-        Some([x as u32 + 20, y as u32 + 12])
-    }
-
-    /// Presses the button of the usual next step once it is there.
-    fn goes_on(&self) {
-        self.waits_for("the next step", || self.main_button().is_some());
-        self.clicks(self.main_button().unwrap());
-    }
-
-    fn waits_for(&self, what: &str, done: impl Fn() -> bool) {
-        let patience = Instant::now() + Duration::from_secs(240);
-        while !done() {
-            assert!(Instant::now() < patience, "{what} did not come");
-            std::thread::sleep(Duration::from_millis(100));
-        }
-    }
-
-    /// Folders of the sessions that hold a file.
-    fn sessions(&self, with: &str) -> Vec<PathBuf> {
-        let entries = fs::read_dir(self.home.join("sessions/craniotomy")).into_iter().flatten().flatten();
-        entries.map(|entry| entry.path()).filter(|path| path.join(with).is_file()).collect()
-    }
-
-    /// Number of cases that the start page remembers.
-    fn recent_cases(&self) -> usize {
-        let kept = fs::read(self.home.join("config/settings.json")).unwrap_or_default();
-        let kept: serde_json::Value = serde_json::from_slice(&kept).unwrap_or_default();
-        kept["recent"].as_array().map_or(0, Vec::len)
-    }
-
-    /// Waits until the session runs, ends it, and waits for its summary and its result page.
-    fn operates(&self, nth: usize) -> serde_json::Value {
-        let recorded = |path: &PathBuf| path.join("session.mcap").metadata().is_ok_and(|file| file.len() > 100_000);
-        self.waits_for("a running session", || {
-            self.sessions("session.mcap").iter().filter(|p| recorded(p)).count() == nth
-        });
-        std::thread::sleep(Duration::from_secs(2));
-        self.does("mousemove 400 400");
-        // A slow picture may miss a key.
-        self.waits_for("the summary", || {
-            self.does("key q");
-            self.sessions("summary.json").len() == nth
-        });
-        // The case is remembered, and its result shown, once everything is written.
-        self.waits_for("the case among the recent ones", || self.recent_cases() == nth);
-        let mut all = self.sessions("summary.json");
-        all.sort();
-        serde_json::from_slice(&fs::read(all[nth - 1].join("summary.json")).unwrap()).unwrap()
-    }
-}
-
-impl Drop for Person {
-    fn drop(&mut self) {
-        for child in [&mut self.program, &mut self.screen] {
-            _ = child.kill();
-            _ = child.wait();
-        }
-    }
-}
-
-/// Pixels in a row of the display, and the colour of the main button.
-const WIDTH: usize = 1280;
-const SKY: [u8; 3] = [86, 180, 233];
 /// Controls at 1280 by 800: "Open CT..." and the first folder of the dialogue.
 const OPEN_CT: [u32; 2] = [162, 404];
 const FIRST_FOLDER: [u32; 2] = [250, 220];
@@ -152,14 +29,147 @@ fn a_person_opens_the_built_in_case_and_then_a_dicom_folder() {
         return;
     };
     person.goes_on();
-    let first = person.operates(1);
+    person.waits_for_session(1);
+    let first = person.ends(1);
     assert_eq!((first["case"].as_str(), first["person"].as_str()), (Some("case-head"), Some("Ada")));
     person.goes_on();
     person.clicks(OPEN_CT);
     person.clicks(FIRST_FOLDER);
     person.goes_on();
     person.goes_on();
-    let second = person.operates(2);
+    person.waits_for_session(2);
+    let second = person.ends(2);
     let case = second["case"].as_str().unwrap();
     assert!(case.starts_with("case-") && case != "case-head" && !case.contains("MUSTERMANN"), "{case}");
+}
+
+/// Middle of the picture at 1280 by 800, where the opening is.
+const MIDDLE: [f32; 2] = [374.0, 400.0];
+/// Buttons of the panel: "Draw the tool back", "Lift the flap, or put it back", "craniotome".
+const DRAW_BACK: [u32; 2] = [1090, 567];
+const LIFT: [u32; 2] = [1135, 495];
+const CRANIOTOME: [u32; 2] = [1135, 466];
+/// Diameter of the flap, mm.
+const FLAP_MM: f32 = 16.0;
+
+#[test]
+fn a_person_drills_a_burr_hole_by_mouse_alone() {
+    let home = tempfile::tempdir().unwrap();
+    let settings = serde_json::json!({ "quality": "draft" });
+    let Some(person) = Person::sits_down(home.path(), &settings.to_string()) else {
+        eprintln!("Xvfb or xdotool is missing: nobody sat down");
+        return;
+    };
+    let began = Instant::now();
+    person.goes_on();
+    person.waits_for_session(1);
+    person.points(MIDDLE);
+    person.rests(2.0);
+    person.does("mousedown 1");
+    person.waits_for("the breakthrough", || person.heard("came through") == 1);
+    eprintln!("through {:.0} s after the click on the start page", began.elapsed().as_secs_f64());
+    // She does not notice.
+    person.rests(4.0);
+    let deepest = |ticks: &[TickRecord]| ticks.iter().map(|tick| tick.brain_distance_mm).fold(f32::MAX, f32::min);
+    let recording = person.recording();
+    let at = recording.ticks.iter().position(|tick| tick.has(TickRecord::THROUGH)).unwrap();
+    let past_mm = recording.ticks[at].brain_distance_mm - deepest(&recording.ticks[at..]);
+    assert!(past_mm < 1.0, "the held button drilled on by {past_mm} mm");
+    assert!(!person.tick().has(TickRecord::DRILLING));
+    person.does("mouseup 1");
+    let summary = person.ends(1);
+    let removed_mm3 = summary["bone_removed_mm3"].as_f64().unwrap();
+    eprintln!("{removed_mm3:.0} mm3 removed, {past_mm:.2} mm past the breakthrough");
+    assert!(removed_mm3 > 50.0 && summary["through_s"].as_array().unwrap().len() == 1, "{removed_mm3}");
+}
+
+/// World mm on the skull around the middle of the picture, seen along the bone's normal.
+struct Chart {
+    middle: Vec2,
+    /// Way of the tip for a pixel to the right and for a pixel down, in the skull's plane.
+    per_pixel: Mat2,
+    /// From world to that plane.
+    plane: Quat,
+}
+
+impl Chart {
+    /// Points at three places and looks where the tool is.
+    fn of(person: &Person) -> Self {
+        let at = |x: f32, y: f32| {
+            person.points([MIDDLE[0] + x, MIDDLE[1] + y]);
+            person.rests(1.5);
+            person.tick().proxy.translation
+        };
+        let (middle, right, down) = (at(0.0, 0.0), at(40.0, 0.0), at(0.0, 40.0));
+        let normal = (down - middle).cross(right - middle).normalize();
+        let plane = Quat::from_rotation_arc(Vec3::Z, normal).inverse();
+        let way = |to: Vec3| (plane * (to - middle)).truncate() / 40.0;
+        Self { middle: (plane * middle).truncate(), per_pixel: Mat2::from_cols(way(right), way(down)), plane }
+    }
+
+    /// Pixel of a place in the skull's plane, from the middle, mm.
+    fn pixel(&self, place: Vec2) -> [f32; 2] {
+        (Vec2::from(MIDDLE) + self.per_pixel.inverse() * place).to_array()
+    }
+
+    /// Where the tool is, from the middle, mm.
+    fn tip(&self, person: &Person) -> Vec2 {
+        (self.plane * person.tick().proxy.translation).truncate() - self.middle
+    }
+}
+
+#[test]
+fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
+    let home = tempfile::tempdir().unwrap();
+    let settings = serde_json::json!({ "quality": "draft", "flap_mm": FLAP_MM });
+    let Some(person) = Person::sits_down(home.path(), &settings.to_string()) else {
+        eprintln!("Xvfb or xdotool is missing: nobody sat down");
+        return;
+    };
+    person.goes_on();
+    person.waits_for_session(1);
+    let chart = Chart::of(&person);
+    let rim = |turn: f32| 0.5 * FLAP_MM * Vec2::from_angle(turn);
+    person.points(chart.pixel(rim(0.0)));
+    person.rests(1.5);
+    // Through the bone, then the width of the drill.
+    for words in ["a hole", "a wide hole"] {
+        person.does("mousedown 1");
+        person.waits_for("the drill", || person.tick().has(TickRecord::DRILLING));
+        person.waits_for(words, || !person.tick().has(TickRecord::DRILLING));
+        person.does("mouseup 1");
+        person.rests(1.5);
+        eprintln!("{words} at {:.0} s", person.tick().time_ms * 1e-3);
+    }
+    person.clicks(CRANIOTOME);
+    person.waits_for("the craniotome", || person.tick().tool == 3);
+    person.points(chart.pixel(rim(0.0)));
+    person.rests(1.5);
+    person.does("mousedown 1");
+    person.rests(3.0);
+    eprintln!("inserted at {:.0} s: brain {:.1} mm", person.tick().time_ms * 1e-3, person.tick().brain_distance_mm);
+    // The foot went in beside the pointer: the drag makes up for it.
+    let off = chart.tip(&person) - rim(0.0);
+    eprintln!("the foot is {off} mm off");
+    let (steps, began_ms) = (36, person.tick().time_ms);
+    for step in 1..=steps + 3 {
+        let to = rim(step as f32 / steps as f32 * std::f32::consts::TAU);
+        person.points(chart.pixel(to - off));
+        // Faster than the tool, which follows on the pointer's way.
+        person.rests(0.3);
+    }
+    let end = rim(3.0 / steps as f32 * std::f32::consts::TAU);
+    person.waits_for("the end of the lap", || {
+        chart.tip(&person).distance(end) < 1.5 && person.tick().time_ms > began_ms + 5e3
+    });
+    eprintln!("a lap at {:.0} s", person.tick().time_ms * 1e-3);
+    person.does("mouseup 1");
+    person.waits_for("the free flap", || person.heard("the flap is free") == 1);
+    person.clicks(DRAW_BACK);
+    person.rests(1.0);
+    person.clicks(LIFT);
+    person.waits_for("the lifted flap", || person.heard("the flap is lifted") == 1);
+    let summary = person.ends(1);
+    eprintln!("plan {}", summary["plan"]);
+    assert!(summary["plan"]["dice"].as_f64().unwrap() > 0.8, "{}", summary["plan"]);
 }

@@ -77,6 +77,17 @@ fn half_a_push_is_a_quarter_of_the_speed_and_more_than_all_is_all() {
 }
 
 #[test]
+fn a_knob_for_the_view_has_a_velocity_without_an_end_of_its_way() {
+    let mut bench = Bench::new();
+    for tick in 1..400 {
+        bench.send([0, 350, 0, 0, 0, 350, 0, 8]);
+        let twist = bench.knob.velocity(50.0 * f64::from(tick));
+        assert!((twist.linear - 0.05 * Vec3::X).length() < 1e-6 && twist.angular.y.abs() > 9e-4, "{twist:?}");
+    }
+    assert_eq!(bench.knob.velocity(30_000.0).linear, Vec3::ZERO, "released");
+}
+
+#[test]
 fn turns_tilt_the_shaft_and_end_at_the_cone() {
     for (turn, axis) in [([350, 0, 0], Vec3::X), ([0, 350, 0], Vec3::Y), ([0, 0, -350], Vec3::Z)] {
         let mut bench = Bench::new();

@@ -21,6 +21,8 @@ const RATE_HZ: f32 = 1000.0;
 pub(crate) struct Operation {
     /// Diameter of the planned flap, mm; 0 for a burr hole alone.
     pub flap_mm: f32,
+    /// The planned flap's line as it was drawn on the skull, RAS mm; empty for a round one.
+    pub flap_line: Vec<[f32; 3]>,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1; `None`: by what
     /// holds the brain.
     pub csf_loss: Option<f32>,
@@ -53,6 +55,10 @@ impl Operation {
         };
         Self {
             flap_mm: flap.unwrap_or(0.0),
+            flap_line: match (&options.flap_line[..], options.flap) {
+                ([], None) => recorded("flap_line").map_or_else(Vec::new, |text| points(text)),
+                (line, _) => line.to_vec(),
+            },
             csf_loss: options.csf_loss.or_else(|| number("csf_loss")).or_else(|| number("fluid_lost")),
             csf_speed_up: options
                 .csf_speed_up
@@ -73,10 +79,14 @@ impl Operation {
     }
 
     /// Entries for a recording's header.
-    pub fn entries(&self) -> [(String, String); 8] {
+    pub fn entries(&self) -> [(String, String); 9] {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
             ("flap_mm".into(), self.flap_mm.to_string()),
+            (
+                "flap_line".into(),
+                self.flap_line.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect::<Vec<_>>().join(","),
+            ),
             ("csf_loss".into(), self.csf_loss.map_or_else(String::new, |share| share.to_string())),
             ("csf_speed_up".into(), self.csf_speed_up.to_string()),
             ("forbidden".into(), forbidden.join(",")),
@@ -86,6 +96,15 @@ impl Operation {
             ("force_waits".into(), self.force_waits.to_string()),
         ]
     }
+}
+
+/// Reads the points of a recorded line; none if one of them is no point.
+fn points(text: &str) -> Vec<[f32; 3]> {
+    let point = |text: &str| {
+        let numbers: Vec<f32> = text.split(' ').map_while(|number| number.parse().ok()).collect();
+        <[f32; 3]>::try_from(numbers).ok()
+    };
+    text.split(',').map(point).collect::<Option<_>>().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -101,13 +120,15 @@ mod tests {
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, None, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
         let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --rate-hz 500 --watch other";
-        let given = Operation::of(&parse(line), &script, None);
+        let drawn = Options { flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]], ..parse(line) };
+        let given = Operation::of(&drawn, &script, None);
         assert!(!given.opening_needed && usual.opening_needed);
         let mut recording = Recording::default();
         assert!(usual.force_waits && !Operation::of(&parse("x"), &script, Some(&recording)).force_waits);
         recording.header.config.extend(given.entries());
         assert_eq!(Operation::of(&parse("x"), &DeviceName::MOUSE, Some(&recording)), given);
-        assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);
+        let round = Operation::of(&parse("x --flap 40"), &script, Some(&recording));
+        assert!(round.flap_mm == 40.0 && round.flap_line.is_empty());
         let older = |line: &str| Operation::of(&parse(line), &script, Some(&recording)).csf_loss;
         assert_eq!((older("x"), older("x --fluid-lost 0.2")), (Some(0.0), Some(0.2)), "the flag of version 0.1");
         let lost = recording.header.config.remove("csf_loss").unwrap();

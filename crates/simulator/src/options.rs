@@ -129,6 +129,9 @@ pub struct Options {
     /// 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
+    /// Line of the planned bone flap as it was drawn on the skull, RAS mm; empty for a round one
+    #[arg(skip)]
+    pub flap_line: Vec<[f32; 3]>,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1. The brain sinks
     /// [default: 0.3, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
     #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]

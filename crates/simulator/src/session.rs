@@ -37,7 +37,7 @@ use std::path::{Path, PathBuf};
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Script;
-use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse};
+use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse, spacemouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::Camera;
@@ -341,6 +341,7 @@ impl Session {
         };
         let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
         let progress = &self.place.progress;
+        let is_knob = |device: &DeviceName| device.kind().name == spacemouse::DEVICE.name;
         let opened = window::Opened {
             progress,
             stage,
@@ -350,6 +351,7 @@ impl Session {
             rate_hz,
             slot: self.options.first_slot,
             guide: self.lesson.clone().map(Guide::new),
+            knob: ![Some(&self.device), self.second.as_ref()].into_iter().flatten().any(is_knob),
         };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {

@@ -223,6 +223,11 @@ fn brain_error(fault: &dyn std::fmt::Display) -> SessionError {
 /// Plans the removal of bone; refuses a flap that the skull does not surround.
 fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
     let hole_mm = Program::Craniotomy.tray()[0].tip_radius_mm;
+    let line: Vec<Vec3> = operation.flap_line.iter().copied().map(Vec3::from).collect();
+    if let (Some(bone), false) = (&scene.bone, line.is_empty()) {
+        let fault = "the line of the flap is not on the skull around the opening; draw it again on the case's page";
+        return Plan::drawn(bone, scene.site, hole_mm, &line).ok_or_else(|| SessionError::Usage(fault.into()));
+    }
     let plan = Plan::new(scene.bone.as_deref(), scene.site, hole_mm, 0.5 * operation.flap_mm);
     plan.ok_or_else(|| {
         let fault = format!(

@@ -14,7 +14,8 @@
 //! Both are read without waiting, at most 64 messages a tick. The knob's axes become x right, y up,
 //! z to the user; [`Workspace`] maps them to world space. The first button is the pedal, the second
 //! requests the next tool. The knob sends nothing at rest: after 100 ms without a message it counts
-//! as released. A lost knob is [`Status::Lost`] until it is opened again.
+//! as released. A lost knob is [`Status::Lost`] until it is opened again. In the other hand it
+//! turns the view: [`SpaceMouse::velocity`].
 //!
 //! # Sources
 //! spacenavd's protocol (its public documentation), the USB HID reports of 3Dconnexion's devices.
@@ -172,15 +173,27 @@ impl SpaceMouse {
         }
     }
 
-    /// Integrates the knob's velocity over `dt_ms`; returns the tool in device space.
-    fn moved(&mut self, dt_ms: f32) -> ToolState {
-        let Config { speed, turning, reach_mm, tilt, .. } = self.config;
+    /// Returns the velocity that the knob sets in device space, without moving the tool: for a view
+    /// that the knob turns. Zero once the knob is lost.
+    pub fn velocity(&mut self, time_ms: f64) -> Twist {
+        self.listen(time_ms);
+        self.set_by_knob()
+    }
+
+    fn set_by_knob(&self) -> Twist {
         let rate = |counts: Vec3| (counts / FULL_SCALE).clamp(-Vec3::ONE, Vec3::ONE);
         let squared = |a: Vec3| a.abs() * a;
+        let linear = squared(rate(self.knob.push)) * self.config.speed;
+        Twist { linear, angular: squared(rate(self.knob.turn)) * self.config.turning }
+    }
+
+    /// Integrates the knob's velocity over `dt_ms`; returns the tool in device space.
+    fn moved(&mut self, dt_ms: f32) -> ToolState {
+        let Config { reach_mm, tilt, .. } = self.config;
+        let Twist { linear, angular } = self.set_by_knob();
         let (from, turned_from) = (self.position, Quat::from_scaled_axis(self.tilt));
-        let way = squared(rate(self.knob.push)) * (speed * dt_ms);
-        self.position = (from + way).clamp(Vec3::splat(-reach_mm), Vec3::splat(reach_mm));
-        self.tilt = (self.tilt + squared(rate(self.knob.turn)) * (turning * dt_ms)).clamp_length_max(tilt);
+        self.position = (from + dt_ms * linear).clamp(Vec3::splat(-reach_mm), Vec3::splat(reach_mm));
+        self.tilt = (self.tilt + dt_ms * angular).clamp_length_max(tilt);
         let rotation = Quat::from_scaled_axis(self.tilt);
         let per_ms = if dt_ms > 0.0 { 1.0 / dt_ms } else { 0.0 };
         let angular = rotation_vector(rotation * turned_from.inverse()) * per_ms;

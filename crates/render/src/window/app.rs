@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 /// First and least width of the side panel, points; at most half of the window.
 const PANEL_WIDTH: f32 = 270.0;
 const PANEL_LEAST: f32 = 180.0;
-/// Longest time between pictures that the tool is led by, s.
-const LONGEST_S: f32 = 0.1;
+/// Longest time between pictures that the tool is led by, s. A slow picture must not slow the feed.
+const LONGEST_S: f32 = 0.4;
 /// Scale of large type.
 const LARGE: f32 = 1.4;
 
@@ -50,6 +50,8 @@ pub(super) struct Window<S, D> {
     last: Option<View>,
     /// Time of the last picture, s.
     pub(super) drawn_at: f64,
+    /// Time from the picture before to that, s.
+    dt_s: f32,
     over: bool,
 }
 
@@ -76,6 +78,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             quality: Quality::new(!hardware, start.detail),
             last: None,
             drawn_at: 0.0,
+            dt_s: 0.0,
             over: false,
         }
     }
@@ -186,6 +189,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             pace: self.quality.pace,
         });
         self.panel = shared.session.update(&input);
+        self.hand.turn_view(&self.panel.knob, 1e3 * self.dt_s);
         #[cfg(feature = "sound")]
         self.panel.values.extend(self.audio.play(self.panel.sound).map(|why| ("sound".into(), why)));
         let now = self.panel.timeline.as_ref().map_or(input.seconds, |timeline| timeline.at_s);
@@ -207,6 +211,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         let space = ui.available_size().max(egui::vec2(8.0, 8.0));
         let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
         let now = ui.input(|i| i.time);
+        self.dt_s = ((now - self.drawn_at) as f32).clamp(0.0, LONGEST_S);
         self.drawn_at = now;
         let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
@@ -279,13 +284,14 @@ impl<S: Session, D: Draws> Window<S, D> {
             view,
             tool,
             world_from_tool: frame.world_from_tool,
-            dt_s: ui.input(|i| i.stable_dt).min(LONGEST_S),
+            dt_s: self.dt_s,
             pedal: ui.input(|i| i.key_down(egui::Key::Space)) || self.clicks.pedal,
         };
         self.tip = frame.world_from_tool.translation;
         self.look.follow(&mut self.hand.camera, self.tip);
         let ViewAndTool { world_from_tool, guide, .. } = &mut self.hand;
         guide.follow(world_from_tool, &pointer, &around);
+        guide.through().into_iter().for_each(|text| self.answers.give(text.into(), self.drawn_at));
         if let Some(leash) = self.panel.leash {
             self.hand.hold(leash, &around.surfaces, tool.tip_radius_mm);
         }

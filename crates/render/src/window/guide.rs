@@ -5,9 +5,12 @@
 //! pointer moves       the tool flies CLEARANCE_MM over what is under it; first up, then across
 //! left button down    it comes down; at the surface a cutting tool begins to turn
 //!   held still        the hand advances along the shaft at the set feed, FEED_LEAD_MM at most
-//!                     ahead of the tool: the spring between the two is the pressure
-//!   dragged           the hand moves with the pointer across the shaft, on the surface, or at its
-//!                     depth in a hole; a craniotome keeps its foot under the bone
+//!                     ahead of the tool: the spring between the two is the pressure. Near the
+//!                     inner table it pushes less; where the bone below comes to be open it stops,
+//!                     and a new press goes on
+//!   dragged           the hand goes the pointer's way across the shaft, on the surface, or at its
+//!                     depth in a hole; a craniotome keeps its foot under the bone. A cutting tool
+//!                     is slower than the pointer: it follows the way, not the chord
 //! left button up      the tool rises; a craniotome in its cut stays
 //! wheel               up or down by WHEEL_MM
 //! ```
@@ -34,8 +37,20 @@ const LANDING_MM_S: f32 = 25.0;
 const SLIDE_MM_S: [f32; 2] = [40.0, 4.0];
 /// Largest lead of the hand over the tool while it pushes, mm.
 const FEED_LEAD_MM: f32 = 2.0;
+/// Largest way of the hand past the inner table of closed bone, and while a hole is widened, mm.
+const PAST_MM: [f32; 2] = [0.5, 1.0];
+/// Depth below a drill down to which bone is before it, mm.
+const BEFORE_MM: f32 = 15.0;
+/// Thickness under which bone is a shell, mm.
+const THIN_MM: f32 = 0.3;
+/// Shares of a drill's radius. A hole begins within the first; a wide one reaches up to the second,
+/// or up to the third for a new press.
+const WIDE: [f32; 3] = [0.35, 0.8, 0.6];
 /// Depth of the hand past a surface along which it slides, mm.
 const SKIM_MM: f32 = 0.3;
+/// Points of the pointer's way that the tool still has to go, and their least distance, mm.
+const TRAIL: usize = 64;
+const TRAIL_MM: f32 = 0.5;
 /// Depth of the centre of a craniotome's foot below the bone, mm.
 const FOOT_MM: f32 = 0.8;
 /// Distance at which a craniotome finds a hole, mm.
@@ -78,17 +93,75 @@ pub(crate) struct Around<'a> {
     pub pedal: bool,
 }
 
+/// How far the bone below a drill is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Below {
+    /// There is bone.
+    Closed,
+    /// A hole begins below the middle of the drill.
+    Pierced,
+    /// The hole is as wide as the drill.
+    Open,
+}
+
 /// A press of the left button.
 #[derive(Clone, Copy, Debug)]
 struct Press {
-    /// Where the tip shall go across the shaft, world mm.
-    goal: Vec3,
+    /// Where the tip shall go across the shaft.
+    trail: Trail,
+    /// The tip in the last picture, world mm.
+    tip: Vec3,
     /// The pointer's place in the plane through the tip, when it was last seen.
     grip: Option<Vec3>,
-    /// Time since the pointer last moved, s.
+    /// Time since pointer or tool last moved, s.
     still_s: f32,
     /// Whether the tool has come down.
     landed: bool,
+    /// How far the bone below the drill was open when it came down.
+    at_first: Option<Below>,
+    /// How far the bone was opened by this press: the feed stops.
+    through: Option<Below>,
+}
+
+/// The pointer's way that the tool has not gone yet.
+#[derive(Clone, Copy, Debug)]
+struct Trail {
+    points: [Vec3; TRAIL],
+    count: usize,
+}
+
+impl Trail {
+    fn to(point: Vec3) -> Self {
+        Self { points: [point; TRAIL], count: 1 }
+    }
+
+    /// Lengthens the way; a full one ends straight.
+    fn extend(&mut self, by: Vec3) {
+        let end = self.points[self.count - 1] + by;
+        let far = self.count < 2 || end.distance(self.points[self.count - 2]) > TRAIL_MM;
+        self.count += usize::from(far && self.count < TRAIL);
+        self.points[self.count - 1] = end;
+    }
+
+    /// The next place on the way.
+    fn next(&self) -> Vec3 {
+        self.points[0]
+    }
+
+    /// Goes along the way across the shaft by at most `step_mm`.
+    fn go(&mut self, from: Vec3, up: Vec3, mut step_mm: f32) -> Vec3 {
+        let mut at = from;
+        loop {
+            let way = (self.next() - at).reject_from(up);
+            at += way.clamp_length_max(step_mm);
+            if way.length() >= step_mm || self.count == 1 {
+                return at;
+            }
+            step_mm -= way.length();
+            self.points.copy_within(1..self.count, 0);
+            self.count -= 1;
+        }
+    }
 }
 
 /// The state of the mouse's lead.
@@ -118,7 +191,15 @@ impl Default for Guide {
 impl Guide {
     /// Whether the left button runs the drill now.
     pub fn pedal(&self) -> bool {
-        self.drills && self.press.is_some_and(|press| press.landed)
+        self.drills && self.press.is_some_and(|press| press.landed && press.through.is_none())
+    }
+
+    /// What to do once the press has opened the bone.
+    pub fn through(&self) -> Option<&'static str> {
+        match self.press?.through? {
+            Below::Open => Some("the hole is open: let go of the button"),
+            _ => Some("through the bone: let go; press again to widen the hole"),
+        }
     }
 
     /// Whether the left button leads the tool.
@@ -165,7 +246,13 @@ impl Guide {
     fn under(&self, pointer: &Pointer, around: &Around<'_>) -> Option<(Vec3, Option<Vec3>)> {
         let (eye, along) = (around.view.eye, around.view.ray(pointer.at?));
         let (point, _) = around.surfaces.seen(eye, along)?;
-        Some((point, around.surfaces.smooth_normal(point, along, SMOOTH_MM)))
+        let Some((middle, normal)) = around.surfaces.smooth(point, along, SMOOTH_MM) else {
+            return Some((point, None));
+        };
+        // A line of sight into a hole means the hole, not the wall or the floor that it meets.
+        let is_hole = (point - middle).dot(normal) < -HOLE_MM;
+        let at_rim = eye + (middle - eye).dot(normal) / along.dot(normal).min(-0.1) * along;
+        Some((if is_hole { at_rim } else { point }, Some(normal)))
     }
 
     /// The press after this picture; a release lets the tool rise, or rest in its cut.
@@ -187,12 +274,13 @@ impl Guide {
         let Some(mut press) = self.press else {
             self.withdraws = false;
             let under = || self.under(pointer, around).map_or(tip, |(point, _)| seat(around, point, up));
-            let goal = if inserted { tip } else { under() };
-            return Some(Press { goal, grip: in_plane, still_s: REST_S, landed: inserted });
+            let trail = Trail::to(if inserted { tip } else { under() });
+            let (at_first, through) = (None, None);
+            return Some(Press { trail, tip, grip: in_plane, still_s: REST_S, landed: inserted, at_first, through });
         };
         if pointer.left != Vec2::ZERO {
             let moved = in_plane.zip(press.grip).map_or(Vec3::ZERO, |(now, before)| now - before);
-            press.goal += moved.reject_from(up);
+            press.trail.extend(moved.reject_from(up));
             press.still_s = 0.0;
         }
         press.grip = in_plane;
@@ -204,9 +292,9 @@ impl Guide {
     fn work(&self, hand: &mut Pose, press: &mut Press, around: &Around<'_>, inserted: bool) {
         let up = hand.rotation * Vec3::Z;
         let tip = around.world_from_tool.translation;
-        let way = (press.goal - hand.translation).reject_from(up);
+        let way = (press.trail.next() - hand.translation).reject_from(up);
         if !press.landed && way.length() > OVER_MM {
-            self.fly_to(hand, press.goal, around);
+            self.fly_to(hand, press.trail.next(), around);
             return;
         }
         let rest = around.surfaces.rest(hand.translation, up, around.tool.tip_radius_mm);
@@ -214,10 +302,22 @@ impl Guide {
         let craniotome = around.tool.cutting_mm > 0.0;
         press.landed |= gap < 0.5 * CLEARANCE_MM;
         let cuts = self.drills && around.tool.kind.cuts();
-        let sliding = way.length() > 0.02 && (press.still_s < REST_S || inserted);
+        let is_drill = cuts && !craniotome;
+        let lead_mm = FEED_LEAD_MM + gap.max(0.0);
+        let lead_mm = if is_drill && press.landed { lead_mm.min(press.stops(around)) } else { lead_mm };
+        if press.through.is_some() {
+            hand.translation = tip;
+            return;
+        }
+        let step = SLIDE_MM_S[usize::from(cuts)] * around.dt_s;
+        let gone = (tip - std::mem::replace(&mut press.tip, tip)).reject_from(up).length();
+        let is_far = way.length() > 0.02 || press.trail.count > 1;
+        if is_far && press.still_s < REST_S && gone > 0.2 * step {
+            press.still_s = 0.0;
+        }
+        let sliding = is_far && (press.still_s < REST_S || inserted);
         if sliding {
-            let step = SLIDE_MM_S[usize::from(cuts)] * around.dt_s;
-            hand.translation += way.clamp_length_max(step);
+            hand.translation = press.trail.go(hand.translation, up, step);
         }
         let foot = craniotome.then(|| around.surfaces.inner(hand.translation, up, foot_ring(&around.tool))).flatten();
         let step_mm = LANDING_MM_S * around.dt_s;
@@ -230,7 +330,7 @@ impl Guide {
         };
         hand.translation += rise * up;
         // Sliding in a cut leads by as much as pushing.
-        hand.translation = tip + (hand.translation - tip).clamp_length_max(lead(gap));
+        hand.translation = tip + (hand.translation - tip).clamp_length_max(lead_mm);
     }
 
     /// Whether a craniotome's foot is under the bone.
@@ -284,6 +384,31 @@ impl Guide {
     }
 }
 
+impl Press {
+    /// Sees whether the press has opened the bone; returns how far the hand may lead the drill, mm.
+    fn stops(&mut self, around: &Around<'_>) -> f32 {
+        let Pose { translation: tip, rotation, .. } = around.world_from_tool;
+        let (up, radius_mm) = (rotation * Vec3::Z, around.tool.tip_radius_mm);
+        let bone = around.surfaces.tables(tip, up, BEFORE_MM);
+        let widths = [WIDE[0], WIDE[if self.at_first.is_some() { 1 } else { 2 }]];
+        let [begun, wide] = widths.map(|share| around.surfaces.open_share(tip, up, (share * radius_mm, BEFORE_MM)));
+        let below = match bone {
+            Some(_) if begun == 0.0 => Below::Closed,
+            None if wide == 1.0 => Below::Open,
+            _ => Below::Pierced,
+        };
+        // A shell that the last press left counts as pierced.
+        let is_thin = bone.is_none_or(|[outer_mm, inner_mm]| inner_mm - outer_mm < THIN_MM);
+        let at_first = *self.at_first.get_or_insert(if is_thin { below.max(Below::Pierced) } else { below });
+        self.through = self.through.or((below > at_first).then_some(below));
+        match (at_first, bone) {
+            (Below::Closed, Some([_, mm])) => (mm - radius_mm).max(0.0) + PAST_MM[0],
+            (Below::Pierced, _) => PAST_MM[1],
+            _ => f32::INFINITY,
+        }
+    }
+}
+
 /// Where a craniotome's foot goes in near a place: the middle of the hole there, if there is one.
 fn seat(around: &Around<'_>, place: Vec3, up: Vec3) -> Vec3 {
     let Tool { cutting_mm, tip_radius_mm, .. } = around.tool;
@@ -309,11 +434,6 @@ fn foot_ring(tool: &Tool) -> f32 {
     2.0 * tool.tip_radius_mm + 1.0
 }
 
-/// Largest distance from the tool to the hand at a gap to the surface, mm.
-fn lead(gap: f32) -> f32 {
-    FEED_LEAD_MM + gap.max(0.0)
-}
-
 /// Where a line of sight meets the plane through a point across a direction.
 fn on_plane(view: &View, at: Vec2, point: Vec3, across: Vec3) -> Option<Vec3> {
     let along = view.ray(at);
@@ -325,6 +445,7 @@ fn on_plane(view: &View, at: Vec2, point: Vec3, across: Vec3) -> Option<Vec3> {
 #[cfg(test)]
 mod tests {
     use super::super::surface::tests::slab;
+    use super::super::surface::{Ray, SurfaceHit};
     use super::*;
     use crate::Camera;
 
@@ -405,6 +526,69 @@ mod tests {
         assert!((bench.hand.translation.z - 3.0 - CLEARANCE_MM).abs() < 0.5 && !bench.guide.is_pressed());
     }
 
+    /// Bone of 6 mm with a round hole of a ball's shape, whose deepest point is at a depth.
+    fn drilled(ray: &Ray, deep_mm: f32) -> Option<SurfaceHit> {
+        let floor = |at: Vec3| {
+            let aside = at.truncate().length();
+            let rise = if deep_mm > 3.0 { 0.0 } else { 3.0 - deep_mm };
+            let wide = (9.0 - rise * rise).max(0.0).sqrt();
+            if aside < wide { -(deep_mm - 3.0 + (9.0 - aside * aside).max(0.0).sqrt()) } else { 0.0 }
+        };
+        let is_bone = |at: Vec3| at.z > -6.0 && at.z < floor(at);
+        let mut last = is_bone(ray.from);
+        for n in 1..(ray.reach_mm / 0.05) as usize {
+            let now = is_bone(ray.from + 0.05 * n as f32 * ray.along);
+            if now && !last {
+                return Some(SurfaceHit { distance_mm: 0.05 * n as f32, normal: -ray.along });
+            }
+            last = now;
+        }
+        None
+    }
+
+    #[test]
+    fn a_held_drill_stops_where_the_bone_is_through_and_goes_on_with_a_new_press() {
+        let mut bench = Bench::with(Tool::burr(3.0));
+        bench.hand = Pose::from_translation(3.5 * Vec3::Z);
+        bench.tip = bench.hand;
+        let (mut deep_mm, mut stops) = (0.0f32, Vec::new());
+        for pointer in [HOLDS, Pointer::NONE, HOLDS, Pointer::NONE, HOLDS] {
+            for _ in 0..400 {
+                let cast = |ray: &Ray| drilled(ray, deep_mm);
+                let pointer = Pointer { at: Some(bench.view.project(Vec3::ZERO).0), ..pointer };
+                let around = Around {
+                    surfaces: Surfaces::new(&cast, [true; 2], None),
+                    view: &bench.view,
+                    tool: bench.tool,
+                    world_from_tool: bench.tip,
+                    dt_s: 0.05,
+                    pedal: false,
+                };
+                bench.guide.follow(&mut bench.hand, &pointer, &around);
+                // It yields as fast as it is pushed, all at once where nothing is left.
+                let yields_mm = if !bench.guide.pedal() {
+                    0.0
+                } else {
+                    0.05 * (bench.tip.translation.z - bench.hand.translation.z)
+                };
+                let bottom = if deep_mm - 3.0 > 6.0 { f32::NEG_INFINITY } else { 3.0 - deep_mm - yields_mm };
+                bench.tip.translation = bench.hand.translation.with_z(bench.hand.translation.z.max(bottom));
+                deep_mm = deep_mm.max(3.0 - bench.tip.translation.z);
+            }
+            stops.push((bench.guide.through(), 3.0 - bench.tip.translation.z));
+        }
+        let (said, deep): (Vec<_>, Vec<_>) = stops.into_iter().unzip();
+        assert!(
+            said[0].is_some_and(|text| text.starts_with("through")) && (5.9..6.6).contains(&deep[0]),
+            "{said:?} {deep:?}"
+        );
+        assert!(
+            said[2].is_some_and(|text| text.starts_with("the hole")) && (6.6..9.6).contains(&deep[2]),
+            "{said:?} {deep:?}"
+        );
+        assert!(said[4].is_none() && deep[4] > 12.0 && deep[1] < 0.0, "a third press means it: {said:?} {deep:?}");
+    }
+
     #[test]
     fn a_drag_slides_on_the_surface() {
         let mut bench = Bench::with(Tool::probe(2.0));
@@ -417,6 +601,25 @@ mod tests {
         let at = bench.tip.translation;
         assert!(at.x > 26.0 && (at.z - 2.0).abs() < 0.01, "{at}");
         assert!(bench.hand.translation.z > 2.0 - FEED_LEAD_MM);
+    }
+
+    #[test]
+    fn a_quick_drag_is_followed_on_its_way_by_a_slow_burr() {
+        let mut bench = Bench::with(Tool::burr(3.0));
+        bench.point(Vec3::new(20.0, 0.0, 0.0), MOVES, 60);
+        bench.point(Vec3::new(20.0, 0.0, 0.0), HOLDS, 20);
+        let drag = Pointer { left: Vec2::ONE, ..HOLDS };
+        let corner = (0..20).map(|n| Vec2::new(20.0 + 0.5 * n as f32, 0.0));
+        let corner = corner.chain((0..20).map(|n| Vec2::new(30.0, 0.5 * n as f32)));
+        corner.for_each(|at| bench.point(at.extend(0.0), drag, 1));
+        let mut off = 0.0f32;
+        for _ in 0..120 {
+            bench.point(Vec3::new(30.0, 9.5, 0.0), HOLDS, 1);
+            let at = bench.tip.translation;
+            off = off.max(at.y.abs().min((at.x - 30.0).abs()));
+        }
+        let at = bench.tip.translation;
+        assert!(off < 0.7 && (at.truncate() - Vec2::new(30.0, 9.5)).length() < 0.7, "{off} mm off, ends at {at}");
     }
 
     #[test]

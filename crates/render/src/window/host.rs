@@ -13,6 +13,7 @@
 
 use super::app::Window;
 use super::page::{self, Page, Textures};
+use super::palette::SKY;
 use super::{Closed, Lent, Session, Shared, Start, WindowError};
 use crate::Painter;
 use eframe::{egui, egui_wgpu::RenderState};
@@ -46,8 +47,11 @@ pub trait Host {
     /// Does what the user pressed.
     fn act(&mut self, action: Self::Action);
 
-    /// Takes a file or folder that was dropped on the window.
-    fn dropped(&mut self, path: PathBuf);
+    /// Takes files and folders that were dropped on the window.
+    fn dropped(&mut self, paths: Vec<PathBuf>);
+
+    /// What letting go of the files over the window would do, in a line.
+    fn hovered(&self) -> String;
 }
 
 /// A session that another thread sent.
@@ -199,7 +203,9 @@ impl<H: Host> Pages<H> {
             guest.replace(Guest::of(offer, self.device.as_ref())).into_iter().for_each(Guest::leave);
         }
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
-        dropped.into_iter().map(|file| file.path().to_path_buf()).for_each(|path| host.dropped(path));
+        if !dropped.is_empty() {
+            host.dropped(dropped.into_iter().map(|file| file.path().to_path_buf()).collect());
+        }
         // Pages are drawn for dark rooms, whatever the session's theme is.
         let theme = std::mem::replace(ui.visuals_mut(), egui::Visuals::dark());
         let actions = match host.shown(guest.is_some()) {
@@ -229,12 +235,95 @@ impl<H: Host> Pages<H> {
                 Vec::new()
             }
         };
+        if ui.input(|input| !input.raw.hovered_files.is_empty()) {
+            landing(ui.ctx(), &host.hovered());
+        }
         actions.into_iter().for_each(|action| host.act(action));
     }
+}
+
+/// Shows over the whole window what happens if files over it are let go.
+fn landing(context: &egui::Context, text: &str) {
+    let area = context.content_rect();
+    let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("landing"));
+    let painter = context.layer_painter(layer);
+    painter.rect_filled(area, 0.0, egui::Color32::from_black_alpha(190));
+    let frame = area.shrink(24.0);
+    painter.rect_stroke(frame, 12.0, egui::Stroke::new(4.0, SKY), egui::StrokeKind::Inside);
+    let font = egui::FontId::proportional(26.0);
+    let galley = painter.layout(super::tr(text), font, egui::Color32::WHITE, frame.width() - 40.0);
+    painter.galley(frame.center() - 0.5 * galley.size(), galley, egui::Color32::WHITE);
 }
 
 impl<H: Host> eframe::App for Pages<H> {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         self.show(ui, frame.wgpu_render_state());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    /// A program that remembers what was dropped.
+    #[derive(Default)]
+    struct Desk(Vec<Vec<PathBuf>>);
+
+    impl Host for Desk {
+        type Action = ();
+
+        fn shown(&mut self, _: bool) -> Shown<()> {
+            Shown::Page(Box::default())
+        }
+
+        fn act(&mut self, (): ()) {}
+
+        fn dropped(&mut self, paths: Vec<PathBuf>) {
+            self.0.push(paths);
+        }
+
+        fn hovered(&self) -> String {
+            "let go here".into()
+        }
+    }
+
+    #[derive(Debug)]
+    struct Dropped(&'static str);
+
+    impl egui::DroppedFile for Dropped {
+        fn path(&self) -> &Path {
+            self.0.as_ref()
+        }
+
+        fn bytes(&self) -> Result<Vec<u8>, String> {
+            Err("only its path counts".into())
+        }
+    }
+
+    /// Shows a picture with files over the window and files let go; returns the texts on it.
+    fn picture(pages: &mut Pages<Desk>, hovered: usize, dropped: &[&'static str]) -> String {
+        let context = egui::Context::default();
+        let input = egui::RawInput {
+            hovered_files: vec![egui::HoveredFile::default(); hovered],
+            dropped_files: dropped.iter().map(|path| Arc::new(Dropped(path)) as egui::DroppedFileHandle).collect(),
+            ..Default::default()
+        };
+        let mut drawn = context.run_ui(input, |ui| pages.show(ui, None));
+        drawn.textures_delta.clear();
+        format!("{:?}", drawn.shapes)
+    }
+
+    #[test]
+    fn files_over_the_window_are_announced_and_dropped_together() {
+        let (_stage, Offers(offers)) = stage();
+        let open = Rc::new(RefCell::new(Open { host: Desk::default(), offers, guest: None }));
+        let mut pages = Pages { open: open.clone(), device: None, textures: Textures::default() };
+        assert!(!picture(&mut pages, 0, &[]).contains("let go here"));
+        assert!(picture(&mut pages, 2, &[]).contains("let go here"));
+        assert!(open.borrow().host.0.is_empty());
+        picture(&mut pages, 0, &["/ct/IM1", "/ct/IM2"]);
+        assert_eq!(open.borrow().host.0, [[PathBuf::from("/ct/IM1"), PathBuf::from("/ct/IM2")]]);
     }
 }

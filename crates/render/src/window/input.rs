@@ -7,7 +7,7 @@ use super::{Leash, Playback};
 use crate::{Camera, View};
 use eframe::egui;
 use glam::{Quat, Vec2, Vec3};
-use trepan_geometry::Pose;
+use trepan_geometry::{Pose, Twist};
 
 /// The user's input, once per picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +49,10 @@ pub struct Pace {
 const ORBIT_RAD: f32 = 0.008;
 /// Tilt of the shaft for a drag, rad per point.
 const TILT_RAD: f32 = 0.006;
+/// Push of a 3-D mouse that doubles the size of the picture, mm.
+const DOUBLES_MM: f32 = 70.0;
+/// Distance of the eye at which a 3-D mouse moves the head as far as its push says, mm.
+const NATURAL_MM: f32 = 300.0;
 /// Move for a key, mm.
 const KEY_MM: f32 = 0.5;
 
@@ -76,6 +80,15 @@ impl ViewAndTool {
         let mm = 2.0 * self.camera.distance_mm * view.half.y / height.max(1.0);
         self.camera.pan(-mm * pans.x, mm * pans.y);
         self.camera.orbit(-ORBIT_RAD * turns.x, ORBIT_RAD * turns.y);
+    }
+
+    /// Moves the camera as if a 3-D mouse held the head; `ms` is the time since the last picture.
+    pub fn turn_view(&mut self, knob: &Twist, ms: f32) {
+        let (push, turn) = (ms * knob.linear, ms * knob.angular);
+        let scale = self.camera.distance_mm / NATURAL_MM;
+        self.camera.pan(-scale * push.x, -scale * push.y);
+        self.camera.zoom((-push.z / DOUBLES_MM).exp2());
+        self.camera.orbit(-turn.y, turn.x);
     }
 
     /// Limits the target pose to the leash. In free air the hand leads as far as the air reaches,
@@ -142,6 +155,25 @@ mod tests {
         assert_eq!(hand.world_from_tool.translation, tip + 50.0 * Vec3::Z);
         hand.hold(Leash { tip: Vec3::NAN, length_mm: 2.0 }, &surfaces, 3.0);
         assert!(hand.world_from_tool.translation.is_finite());
+    }
+
+    #[test]
+    fn a_three_d_mouse_moves_the_head_as_the_knob_goes_and_the_tool_not_at_all() {
+        let (mut hand, view) = hand();
+        let (tool, head) = (hand.world_from_tool, Vec3::new(0.0, 90.0, 0.0));
+        let at = |hand: &ViewAndTool| hand.camera.view(1.5).project(head);
+        let before = at(&hand);
+        let knob = |linear, angular| Twist { linear, angular };
+        hand.turn_view(&knob(0.05 * Vec3::X, Vec3::ZERO), 100.0);
+        assert!(at(&hand).0.x > before.0.x + 0.01, "to the right");
+        hand.turn_view(&knob(-0.05 * Vec3::X + 0.05 * Vec3::Z, Vec3::ZERO), 100.0);
+        assert!(at(&hand).1 < before.1 - 5.0, "to the user: {} of {}", at(&hand).1, before.1);
+        hand.turn_view(&knob(-0.05 * Vec3::Z, 1e-3 * Vec3::Y), 100.0);
+        assert!(at(&hand).0.x > before.0.x + 0.01, "the front of the head turns to the right");
+        hand.turn_view(&knob(Vec3::ZERO, 1e-3 * (Vec3::X - Vec3::Y)), 100.0);
+        assert!(at(&hand).0.y < before.0.y - 0.01, "the front goes down as the top comes to the user");
+        hand.turn_view(&Twist::default(), 1000.0);
+        assert!(view.eye.is_finite() && hand.world_from_tool == tool);
     }
 
     #[test]

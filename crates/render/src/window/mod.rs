@@ -68,7 +68,7 @@ pub use capture::Capture;
 pub use draws::{Draws, Refined};
 pub use host::{Host, Offers, Pages, Shown, Stage, open, stage};
 pub use input::{Pace, WindowInput};
-pub use page::{Amount, Button, Choosable, Item, Page, Picture};
+pub use page::{Amount, Button, Choosable, Drag, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 pub use surface::{Ray, SurfaceHit};
 pub use words::{Language, missing, speak, tr};

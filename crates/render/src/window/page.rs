@@ -125,8 +125,23 @@ pub struct Picture<A> {
     pub letters: Vec<([f32; 2], String)>,
     /// The action of a click at a position, a share of width and height.
     pub clicked: Option<fn([f32; 2]) -> A>,
-    /// The action of a drag by a share of width and height.
-    pub dragged: Option<fn([f32; 2]) -> A>,
+    /// The action of a drag.
+    pub dragged: Option<fn(Drag) -> A>,
+}
+
+/// What a drag over a picture did since the last time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drag {
+    /// Its way, a share of width and height.
+    pub by: [f32; 2],
+    /// Where the pointer is, a share of width and height.
+    pub at: [f32; 2],
+    /// Whether the left button leads it.
+    pub left: bool,
+    /// Whether it begins now.
+    pub begins: bool,
+    /// Whether it is over.
+    pub ends: bool,
 }
 
 impl<A> Item<A> {
@@ -406,8 +421,22 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut 
     if let (true, Some(does), Some(at)) = (response.clicked(), picture.clicked, response.interact_pointer_pos()) {
         done.push(does(share(at - area.min)));
     }
-    if let Some(does) = picture.dragged.filter(|_| response.dragged()) {
-        done.push(does(share(response.drag_delta())));
+    if let Some(does) = picture.dragged.filter(|_| response.dragged() || response.drag_stopped()) {
+        let left = egui::PointerButton::Primary;
+        let from = ui.input(|input| input.pointer.press_origin());
+        let pointer = ui.input(|input| input.pointer.latest_pos()).unwrap_or(area.min);
+        let drag = |at: egui::Pos2| Drag {
+            by: share(response.drag_delta()),
+            at: share(at - area.min),
+            left: response.dragged_by(left) || response.drag_stopped_by(left),
+            begins: false,
+            ends: response.drag_stopped(),
+        };
+        // It counts as a drag only some points after the press.
+        let start =
+            from.filter(|_| response.drag_started()).map(|from| Drag { begins: true, by: [0.0; 2], ..drag(from) });
+        done.extend(start.map(does));
+        done.push(does(drag(pointer)));
     }
 }
 

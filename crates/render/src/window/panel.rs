@@ -49,6 +49,16 @@ pub(crate) fn show(
     filming: bool,
 ) -> Clicks {
     let mut clicks = Clicks::default();
+    egui::Panel::bottom("end").resizable(false).show(ui, |ui| {
+        ui.add_space(4.0);
+        let name = if panel.timeline.is_some() { "Close the replay" } else { "End the operation" };
+        let end =
+            egui::Button::new(RichText::new(tr(name)).strong()).wrap().min_size(egui::vec2(ui.available_width(), 32.0));
+        if ui.add(end).on_hover_text(tr("Q; the report is written and shown")).clicked() {
+            clicks.commands.push(Command::Quit);
+        }
+        ui.add_space(4.0);
+    });
     // All of it scrolls: nothing is cut off on a small screen.
     egui::ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
         ui.add_space(8.0);
@@ -91,7 +101,6 @@ fn window_buttons(ui: &mut egui::Ui, clicks: &mut Clicks) {
         (Command::Light, "bright rooms, or dark ones"),
         (Command::FullScreen, "without the frame of the window"),
         (Command::Help, "all keys and what the mouse does"),
-        (Command::Quit, "ends the session and keeps its report"),
     ] {
         if ui.button(label(command)).on_hover_text(tr(why)).clicked() {
             clicks.commands.push(command);

@@ -1,7 +1,7 @@
 //! The data that a session sends to its window.
 
 use std::sync::Arc;
-use trepan_geometry::{Tool, Vec3};
+use trepan_geometry::{Tool, Twist, Vec3};
 
 /// Contents of the panel beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,6 +52,8 @@ pub struct Panel {
     pub timeline: Option<Timeline>,
     /// Limit of the distance from hand to tool; `None` for no limit.
     pub leash: Option<Leash>,
+    /// Velocity of a 3-D mouse in the other hand, mm/ms and rad/ms: right, up, to the user.
+    pub knob: Twist,
     /// Whether the window should close.
     pub finished: bool,
 }

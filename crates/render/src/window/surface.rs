@@ -93,9 +93,27 @@ impl<'a> Surfaces<'a> {
         (2 * heights.len() > RING).then(|| heights[heights.len() / 2])
     }
 
-    /// The normal of the surface around a point on a line of sight. It comes from a ring of rays
-    /// beside that line, so a hole at the point does not turn it; `None` at an edge.
-    pub fn smooth_normal(&self, point: Vec3, along: Vec3, radius_mm: f32) -> Option<Vec3> {
+    /// Depths of the bone's outer and inner surface below a place in the air, mm; `None` where no
+    /// bone begins within `reach_mm`.
+    pub fn tables(&self, place: Vec3, up: Vec3, reach_mm: f32) -> Option<[f32; 2]> {
+        let cast = |from, along, reach_mm| (self.cast)(&Ray { from, along, reach_mm, bone: true, brain: false });
+        let outer_mm = cast(place, -up, reach_mm)?.distance_mm;
+        let deep_mm = outer_mm + INSIDE_MM;
+        // Bone that is thicker has no inner surface within reach.
+        let back = cast(place - deep_mm * up, up, INSIDE_MM + 1.0);
+        Some([outer_mm, back.map_or(deep_mm, |hit| deep_mm - hit.distance_mm)])
+    }
+
+    /// Share of a circle around a place below which no bone lies, down to a depth, mm.
+    pub fn open_share(&self, place: Vec3, up: Vec3, (radius_mm, reach_mm): (f32, f32)) -> f32 {
+        let ray = |aside| Ray { from: place + aside, along: -up, reach_mm, bone: true, brain: false };
+        let open = ring(up, radius_mm).filter(|aside| (self.cast)(&ray(*aside)).is_none());
+        open.count() as f32 / RING as f32
+    }
+
+    /// A point and the normal of the surface around a point on a line of sight. They come from a
+    /// ring of rays beside that line, so a hole at the point does not move them; `None` at an edge.
+    pub fn smooth(&self, point: Vec3, along: Vec3, radius_mm: f32) -> Option<(Vec3, Vec3)> {
         let meet = |aside: Vec3| {
             let from = point + aside - ABOVE_MM * along;
             let hit = self.ahead(from, along, ABOVE_MM + BELOW_MM)?;
@@ -111,7 +129,7 @@ impl<'a> Surfaces<'a> {
         let normal = area.try_normalize()?;
         let normal = if normal.dot(along) > 0.0 { -normal } else { normal };
         let is_flat = |at: &Vec3| (*at - middle).dot(normal).abs() < 0.5 * radius_mm;
-        around.iter().all(is_flat).then_some(normal)
+        around.iter().all(is_flat).then_some((middle, normal))
     }
 }
 
@@ -175,7 +193,7 @@ pub(crate) mod tests {
         assert!(inner.abs() < 1e-3);
         assert_eq!(surfaces.inner(Vec3::new(0.0, 0.0, -6.0), Vec3::Z, 2.0), None, "no bone around it");
         let along = Vec3::new(0.3, 0.0, -1.0).normalize();
-        let normal = |x: f32, z: f32| surfaces.smooth_normal(Vec3::new(x, 0.0, z), along, 6.0).unwrap();
+        let normal = |x: f32, z: f32| surfaces.smooth(Vec3::new(x, 0.0, z), along, 6.0).unwrap().1;
         assert!((normal(20.0, 0.0) - Vec3::Z).length() < 1e-3);
         assert!((normal(0.0, -3.0) - Vec3::Z).length() < 0.05, "over the wall of the hole: {}", normal(0.0, -3.0));
     }

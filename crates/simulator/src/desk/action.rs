@@ -2,6 +2,7 @@
 
 use crate::desk::browse::Goal;
 use std::path::PathBuf;
+use trepan_render::window::Drag;
 
 /// What a press of a control does.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,8 +53,12 @@ pub(crate) enum Action {
     Check,
     /// Chooses the opening by a click on the head, a share of the picture.
     OpenAt([f32; 2]),
-    /// Turns the head, by a share of the picture.
-    Turn([f32; 2]),
+    /// Turns the head, or draws the flap's line on it.
+    Drag(Drag),
+    /// Whether the left button draws the flap's line: yes is the second option.
+    Draw(usize),
+    /// Forgets the drawn line of the flap.
+    RoundFlap,
     /// Sets the share of the MRI in the slices.
     Blend(f32),
     /// Moves the slices along an axis to a place, mm.

@@ -73,6 +73,33 @@ impl Goal {
     }
 }
 
+/// The purpose that a file or folder names itself; `None` where the user must say it.
+pub(crate) fn purpose(path: &Path) -> Option<Goal> {
+    if path.extension().is_some_and(|end| end == "mcap") {
+        return Some(Goal::Recording);
+    }
+    if path.join("case.json").is_file() {
+        return Some(Goal::Case);
+    }
+    let first = || fs::read_dir(path).ok()?.flatten().map(|entry| entry.path()).filter(|path| path.is_file()).min();
+    let slice = if path.is_dir() { first()? } else { path.into() };
+    match trepan_volume::dicom::series(&slice).ok()?.first()?.modality.as_str() {
+        "CT" => Some(Goal::Ct),
+        "MR" => Some(Goal::Mri),
+        _ => None,
+    }
+}
+
+/// Dropped files as they are opened: slices of one folder stand for that folder.
+pub(crate) fn together(mut paths: Vec<PathBuf>) -> Vec<PathBuf> {
+    let is_slice = |path: &PathBuf| path.is_file() && trepan_volume::dicom::series(path).is_ok();
+    if paths.len() > 1 {
+        paths.iter_mut().filter(|path| is_slice(path)).for_each(|path| _ = path.pop());
+        paths.dedup();
+    }
+    paths
+}
+
 /// Largest number of entries that are listed.
 const MOST: usize = 400;
 

@@ -4,20 +4,23 @@
 //! # Practice
 //! The slices show the skull's density in the case's voxels and the MRI around the brain, as the
 //! session uses them, with the patient's right on the left. A click on the head chooses the
-//! opening: the line from there to the centre of the head.
+//! opening: the line from there to the centre of the head. A drag turns the head, or draws the line
+//! of the flap on it; if the line does not surround the opening, its middle is the opening.
 
 use crate::case::Case;
 use crate::case::opening::eye;
+use crate::case::plan::Plan;
 use crate::desk::action::Action;
 use crate::error::SessionError;
 use crate::printable::printable;
+use crate::program::Program;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, DVec3, Vec2};
 use std::sync::Arc;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Site;
-use trepan_render::window::{Amount, Item, Page, Picture};
+use trepan_render::window::{Amount, Choosable, Drag, Item, Page, Picture};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -27,6 +30,8 @@ const HEAD: [u32; 2] = [420, 340];
 const SLICE: u32 = 220;
 /// Grey range of bone, HU, numerical.
 const WINDOW_HU: [f64; 2] = [-200.0, 1500.0];
+/// Least distance of the points of a drawn line, mm, numerical.
+const POINT_MM: f32 = 1.0;
 /// Steps of a ray on its way to the bone, mm, numerical.
 const STEP_MM: f32 = 0.4;
 /// Turn of the head for a drag over the whole picture, rad, numerical.
@@ -67,6 +72,10 @@ pub(crate) struct Check {
     slices: [(u64, Arc<Image>); 3],
     /// The chosen opening, RAS mm.
     pub opening: Option<[f32; 3]>,
+    /// The line of the flap on the skull, RAS mm, from the burr hole on; empty without one.
+    pub line: Vec<Vec3>,
+    /// Whether the left button draws it.
+    pub draws: bool,
     made: u64,
 }
 
@@ -77,8 +86,8 @@ struct Head {
     camera: Camera,
     image: (u64, Arc<Image>),
     centre: Vec3,
-    /// Where the skull is opened.
-    place: Option<Vec3>,
+    /// Where the skull is opened, and in which direction.
+    place: Option<(Vec3, Vec3)>,
 }
 
 impl Head {
@@ -86,12 +95,25 @@ impl Head {
         self.camera.view(HEAD[0] as f32 / HEAD[1] as f32)
     }
 
-    /// A cross on the place of the opening, and R and L on the sides of the patient.
-    fn marks(&self) -> Vec<([f32; 2], String)> {
+    /// The bone under a place of the picture.
+    fn under(&self, [x, y]: [f32; 2]) -> Option<Vec3> {
+        let view = self.view();
+        first_bone(&self.bone, view.eye, view.ray(Vec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y)))
+    }
+
+    /// Marks on the picture: the place of the opening, the patient's sides, a flap's line. O is its
+    /// burr hole.
+    fn marks(&self, line: &[Vec3]) -> Vec<([f32; 2], String)> {
         let half_mm = 0.5 * self.bone.bounds().size().x;
         let sides = [("R", half_mm), ("L", -half_mm)].map(|(side, mm)| (side, self.centre + mm * Vec3::X));
-        let all = self.place.map(|place| ("+", place)).into_iter().chain(sides);
         let view = self.view();
+        let is_seen = |point: &&Vec3| {
+            let first = first_bone(&self.bone, view.eye, (**point - view.eye).normalize());
+            first.is_some_and(|bone| bone.distance(**point) < 3.0)
+        };
+        let line = line.iter().enumerate().map(|(at, point)| (if at == 0 { "O" } else { "•" }, point));
+        let line = line.filter(|(_, point)| is_seen(point)).map(|(mark, point)| (mark, *point));
+        let all = self.place.map(|(place, _)| ("+", place)).into_iter().chain(sides).chain(line);
         let on_picture = |(text, point): (&str, Vec3)| {
             let (at, _) = view.project(point);
             ([0.5 + 0.5 * at.x, 0.5 - 0.5 * at.y].map(|share| share.clamp(0.03, 0.97)), text.to_string())
@@ -105,7 +127,7 @@ impl Check {
     pub fn of(
         case: Case,
         name: String,
-        opening: Option<[f32; 3]>,
+        (opening, line): (Option<[f32; 3]>, &[[f32; 3]]),
         gpu: Result<Gpu, GpuError>,
     ) -> Result<Self, SessionError> {
         let bounds = match (&case.skull, &case.brain) {
@@ -125,14 +147,15 @@ impl Check {
                 painter.set_quality(true, 1.0)?;
                 let towards = site.as_ref().map_or(Vec3::Y, eye);
                 let camera = Camera::viewed_from(bounds.centre(), towards, 420.0);
-                let place = site.map(|site| site.entry);
+                let place = site.map(|site| (site.entry, site.inward));
                 Some(Head { bone, painter, camera, image: (0, blank()), centre, place })
             }
             None => None,
         };
         let slices = std::array::from_fn(|_| (0, blank()));
-        let at = head.as_ref().and_then(|head| head.place).unwrap_or(bounds.centre());
-        let mut check = Self { case, name, at, mri: 0.5, bounds, head, slices, opening, made: 0 };
+        let at = head.as_ref().and_then(|head| head.place).map_or(bounds.centre(), |place| place.0);
+        let (line, draws, mri) = (line.iter().copied().map(Vec3::from).collect(), false, 0.5);
+        let mut check = Self { case, name, at, mri, bounds, head, slices, opening, line, draws, made: 0 };
         check.draw_slices();
         check.draw_head()?;
         Ok(check)
@@ -159,24 +182,67 @@ impl Check {
     }
 
     /// Chooses the opening under a click on the head; false where there is no bone.
-    pub fn open_at(&mut self, [x, y]: [f32; 2]) -> Result<bool, SessionError> {
-        let Some(head) = &mut self.head else { return Ok(false) };
-        let view = head.view();
-        let ray = view.ray(Vec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y));
-        let Some(place) = first_bone(&head.bone, view.eye, ray) else { return Ok(false) };
-        head.place = Some(place);
+    pub fn open_at(&mut self, at: [f32; 2]) -> Result<bool, SessionError> {
+        let Some(place) = self.head.as_ref().and_then(|head| head.under(at)) else { return Ok(false) };
+        self.line.clear();
+        self.open(place)?;
+        Ok(true)
+    }
+
+    /// Opens the skull at a place on it.
+    fn open(&mut self, place: Vec3) -> Result<(), SessionError> {
+        let Some(head) = &mut self.head else { return Ok(()) };
+        let outward = (place - head.centre).normalize_or_zero();
+        head.place = Some((place, -outward));
         self.at = place;
         // A point a little outside, on the line to the centre of the head.
-        self.opening = Some((place + 5.0 * (place - head.centre).normalize_or_zero()).to_array());
+        self.opening = Some((place + 5.0 * outward).to_array());
         self.draw_slices();
-        self.draw_head()?;
-        Ok(true)
+        self.draw_head()
+    }
+
+    /// Turns the head, or draws the flap's line; returns why the line cannot be cut.
+    pub fn drag(&mut self, drag: Drag) -> Result<Option<&'static str>, SessionError> {
+        let Some(head) = self.head.as_ref().filter(|_| self.draws && drag.left) else {
+            return self.turn(drag.by).map(|()| None);
+        };
+        if drag.begins {
+            self.line.clear();
+        }
+        let is_new = |point: &Vec3| self.line.last().is_none_or(|last| last.distance(*point) > POINT_MM);
+        self.line.extend(head.under(drag.at).filter(is_new));
+        if drag.ends { self.close() } else { Ok(None) }
+    }
+
+    /// Closes the drawn line; returns why it cannot be cut.
+    fn close(&mut self) -> Result<Option<&'static str>, SessionError> {
+        let Some(head) = &self.head else { return Ok(None) };
+        let middle = self.line.iter().sum::<Vec3>() / self.line.len().max(1) as f32;
+        let inward = (head.centre - middle).normalize_or_zero();
+        let around_middle = || Some((first_bone(&head.bone, middle - 20.0 * inward, inward)?, inward));
+        let plan = |(entry, inward)| {
+            let site = Site { entry, inward, bone_mm: 0.0, brain_mm: 0.0 };
+            Plan::drawn(&head.bone, site, Program::Craniotomy.tray()[0].tip_radius_mm, &self.line)
+        };
+        let (is_moved, planned) = match head.place.and_then(plan) {
+            Some(plan) => (false, Some(plan)),
+            None => (true, around_middle().and_then(plan)),
+        };
+        let Some(plan) = planned else {
+            self.line.clear();
+            return Ok(Some("This line holds no flap: draw it on the skull in one go, around some bone"));
+        };
+        self.line = plan.outline.iter().map(|rim| rim.outer).collect();
+        if is_moved {
+            self.open(plan.site.entry)?;
+        }
+        Ok(None)
     }
 
     fn draw_head(&mut self) -> Result<(), SessionError> {
         self.made += 1;
         let Some(head) = &mut self.head else { return Ok(()) };
-        let markers: Vec<Vec3> = head.place.into_iter().collect();
+        let markers: Vec<Vec3> = head.place.map(|place| place.0).into_iter().collect();
         let slices = SliceLook { shown: false, ..SliceLook::default() };
         let overlay = Overlay { markers: &markers, ..Overlay::default() };
         let frame = Frame { slices, overlay, ..Frame::of(head.camera) };
@@ -235,14 +301,27 @@ impl Check {
     pub fn page(&self, fault: Option<&str>) -> Page<Action> {
         let mut head: Vec<Item<Action>> = vec![Item::Heading("Place of the opening".into())];
         if let Some(shown) = &self.head {
-            head.push(Item::Note("Click on the skull to open it there; drag to turn it.".into()));
+            let option = |name: &str, hint: &str| Choosable { name: name.into(), hint: hint.into(), open: true };
+            let options = vec![
+                option("opens and turns", "a click on the skull opens it there, a drag turns the head"),
+                option(
+                    "draws the flap",
+                    "a drag along the skull is the line to cut; the burr hole is at its beginning",
+                ),
+            ];
+            head.push(Item::Choice("Left button".into(), options, usize::from(self.draws), Action::Draw));
+            let what = match self.draws {
+                false => "Click on the skull to open it there; drag to turn it.",
+                true => "Drag on the skull around the bone to lift; the right button turns the head.",
+            };
+            head.push(Item::Note(what.into()));
             head.push(Item::Picture(Picture {
                 name: "head".into(),
                 image: shown.image.clone(),
                 height: HEAD[1] as f32,
-                letters: shown.marks(),
-                clicked: Some(Action::OpenAt),
-                dragged: Some(Action::Turn),
+                letters: shown.marks(&self.line),
+                clicked: (!self.draws).then_some(Action::OpenAt),
+                dragged: Some(Action::Drag),
             }));
         }
         let place = match (self.opening, self.case.opening) {
@@ -253,6 +332,12 @@ impl Check {
             (None, None) => "no place yet".into(),
         };
         head.push(Item::Text(place));
+        if !self.line.is_empty() {
+            head.push(Item::Row(vec![
+                Item::Text("Flap: the line that you drew; O is the burr hole".into()),
+                Item::button("Round flap", "forgets this line", Action::RoundFlap),
+            ]));
+        }
         head.extend(fault.map(|fault| Item::Alert(fault.into())));
         head.push(Item::Heading("Remarks".into()));
         let notes = self.case.notes.iter().map(|note| Item::Note(printable(note)));
@@ -371,7 +456,7 @@ mod tests {
 
     #[test]
     fn a_click_on_the_head_chooses_the_opening_and_the_slices_go_there() {
-        let mut check = Check::of(ball(), "c".into(), None, Err(GpuError::NoAdapter)).unwrap();
+        let mut check = Check::of(ball(), "c".into(), (None, &[]), Err(GpuError::NoAdapter)).unwrap();
         assert!(!check.open_at([0.01, 0.01]).unwrap() && check.opening.is_none(), "beside the head");
         assert!(check.open_at([0.5, 0.5]).unwrap());
         let [x, y, z] = check.opening.unwrap();
@@ -380,8 +465,34 @@ mod tests {
     }
 
     #[test]
+    fn a_line_drawn_on_the_head_is_the_flap_and_a_scribble_is_not() {
+        let mut check = Check::of(ball(), "c".into(), (None, &[]), Err(GpuError::NoAdapter)).unwrap();
+        let draw = |check: &mut Check, way: &[[f32; 2]]| {
+            let mut said = None;
+            for (n, at) in way.iter().enumerate() {
+                let (begins, ends) = (n == 0, n + 1 == way.len());
+                said = check.drag(Drag { at: *at, left: true, begins, ends, ..Drag::default() }).unwrap();
+            }
+            said
+        };
+        let place = |turn: f32, wide: f32| [0.5 + wide * turn.cos(), 0.5 + wide * turn.sin()];
+        let ring: Vec<[f32; 2]> = (0..40).map(|n| place(n as f32 * 0.157, 0.06)).collect();
+        assert_eq!((draw(&mut check, &ring), check.line.len()), (None, 0), "a drag turns the head");
+        check.draws = true;
+        assert_eq!(draw(&mut check, &ring), None);
+        assert!(check.line.len() > 30 && check.opening.is_some(), "the middle of the line is the opening");
+        let off = |point: &Vec3| (point.distance(Vec3::new(-5.0, 0.0, 0.0)) - 29.5).abs();
+        assert!(check.line.iter().all(|point| off(point) < 1.5), "it lies on the skull: {:?}", check.line);
+        let opening = check.opening;
+        assert_eq!(draw(&mut check, &ring[..3]).is_some(), check.line.is_empty(), "too small");
+        assert!(check.line.is_empty() && draw(&mut check, &[[0.01, 0.01]]).is_some(), "beside the head");
+        let small: Vec<[f32; 2]> = (0..40).map(|n| place(n as f32 * 0.157, 0.05)).collect();
+        assert_eq!((draw(&mut check, &small), check.opening), (None, opening), "around the same opening");
+    }
+
+    #[test]
     fn the_patients_right_is_on_the_left_of_an_axial_slice() {
-        let mut check = Check::of(ball(), "c".into(), None, Err(GpuError::NoAdapter)).unwrap();
+        let mut check = Check::of(ball(), "c".into(), (None, &[]), Err(GpuError::NoAdapter)).unwrap();
         check.blend(0.0);
         check.slide(2, 0.0);
         let image = check.slices[0].1.clone();

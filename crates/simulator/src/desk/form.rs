@@ -116,6 +116,9 @@ impl Form {
         if self.settings.flap_mm > 0.0 && program.has_bone() {
             options.flap = Some(self.settings.flap_mm);
         }
+        if program.has_bone() && !self.case.flap_line.is_empty() {
+            options.flap_line.clone_from(&self.case.flap_line);
+        }
         options.first_slot = self.settings.tool.min(Self::tools(program).len().saturating_sub(1));
         options.person = Some(self.settings.person.clone()).filter(|person| !person.trim().is_empty());
         options.name = Some(self.session.clone()).filter(|name| !name.trim().is_empty());
@@ -128,7 +131,7 @@ impl Form {
     pub fn replay(&self, base: &Options, program: Program, recording: &Path) -> Result<Options, SessionError> {
         let options = self.options(base, program)?;
         let device = Some(format!("replay:{}", recording.display()));
-        Ok(Options { device, quality: base.quality, flap: base.flap, ..options })
+        Ok(Options { device, quality: base.quality, flap: base.flap, flap_line: base.flap_line.clone(), ..options })
     }
 }
 
@@ -153,10 +156,12 @@ mod tests {
             (given.device.as_deref(), given.flap, given.patient.register),
             (Some("script:flap"), Some(30.0), true)
         );
-        form.case = Recent { source: Source::Folder("c".into()), opening: Some([0.0; 3]), ..Recent::default() };
+        let (opening, flap_line) = (Some([0.0; 3]), vec![[1.0; 3]; 3]);
+        form.case = Recent { source: Source::Folder("c".into()), opening, flap_line, ..Recent::default() };
         let folder = form.options(&base, Program::Integrated).unwrap();
-        assert_eq!((folder.case, folder.patient.opening), (Some("c".into()), None));
+        assert_eq!((folder.case, folder.patient.opening, folder.flap_line.len()), (Some("c".into()), None, 3));
         let replay = form.replay(&base, Program::Integrated, Path::new("a.mcap")).unwrap();
         assert_eq!((replay.device.as_deref(), replay.flap), (Some("replay:a.mcap"), None));
+        assert!(replay.flap_line.is_empty(), "a recording brings its own");
     }
 }

@@ -165,7 +165,7 @@ impl Gallery {
         fs::create_dir_all(self.home.join("images/series")).unwrap();
         self.act(Action::Into(self.home.join("images")));
         look(self, "browse");
-        self.window.state().with_host(|desk| desk.dropped("/images".into()));
+        self.window.state().with_host(|desk| desk.dropped(vec!["/images".into()]));
         look(self, "dropped");
         self.act(Action::Sessions);
         look(self, "no-sessions");

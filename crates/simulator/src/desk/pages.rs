@@ -95,6 +95,12 @@ fn chosen(case: &Recent) -> Vec<Item<Action>> {
             Item::button("Usual place", "forgets this place", Action::UsualOpening),
         ]));
     }
+    if !case.flap_line.is_empty() {
+        items.push(Item::Row(vec![
+            Item::Text("Flap along the line that you drew".into()),
+            Item::button("Round flap", "forgets this line", Action::RoundFlap),
+        ]));
+    }
     items
 }
 

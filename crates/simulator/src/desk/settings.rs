@@ -70,6 +70,8 @@ pub(crate) struct Recent {
     pub picture: Option<PathBuf>,
     /// Place of the opening, RAS mm, if the user chose one.
     pub opening: Option<[f32; 3]>,
+    /// Line of the flap that the user drew on the skull, RAS mm; empty without one.
+    pub flap_line: Vec<[f32; 3]>,
 }
 
 /// Where a case comes from.

@@ -6,7 +6,7 @@ use crate::case::Case;
 use crate::case::cache::Cache;
 use crate::case::choice::case_to_check;
 use crate::desk::action::Action;
-use crate::desk::browse::{Folder, Goal};
+use crate::desk::browse::{self, Folder, Goal};
 use crate::desk::check::Check;
 use crate::desk::draft::{self, Looked};
 use crate::desk::form::Form;
@@ -61,6 +61,8 @@ pub(crate) struct Desk {
     /// Whether the program was started for one session.
     direct: bool,
     pub(super) last: Option<Result<Done, SessionError>>,
+    /// Dropped files and folders that still need a purpose.
+    waiting: Vec<PathBuf>,
     devices: Receiver<Vec<Listed>>,
     stop: Stop,
     pictures: Pictures,
@@ -92,6 +94,7 @@ impl Desk {
             device,
             direct,
             last,
+            waiting: Vec::new(),
             devices,
             stop,
             pictures: Pictures::default(),
@@ -182,8 +185,8 @@ impl Desk {
 
     /// Shows a case in pictures.
     fn look_at(&mut self, case: Case) {
-        let Recent { name, opening, .. } = self.form.case.clone();
-        match Check::of(case, name, opening, self.device.clone()) {
+        let Recent { name, opening, flap_line, .. } = self.form.case.clone();
+        match Check::of(case, name, (opening, &flap_line), self.device.clone()) {
             Ok(check) => self.view = View::Check(Box::new(check), None),
             Err(fault) => self.fail(fault),
         }
@@ -224,6 +227,19 @@ impl Desk {
         let folder = Folder::list(path, goal);
         let written = path.display().to_string();
         self.view = View::Browse(goal, folder, written);
+    }
+
+    /// Takes what was dropped, until one needs the user to say what it is.
+    fn take_waiting(&mut self) {
+        while let Some(path) = self.waiting.pop() {
+            match browse::purpose(&path) {
+                Some(goal) => self.take_path(goal, path),
+                None => return self.view = View::Page(Box::new(pages::sort(&path))),
+            }
+            if matches!(self.view, View::Session(..)) {
+                self.waiting.clear();
+            }
+        }
     }
 
     fn take_path(&mut self, goal: Goal, path: PathBuf) {
@@ -321,7 +337,11 @@ impl Host for Desk {
                     *register = at == 1;
                 }
             }
-            Action::UsualOpening => form.case.opening = None,
+            Action::UsualOpening => {
+                (form.case.opening, form.case.flap_line) = (None, Vec::new());
+                form.case.hash.clear();
+            }
+            Action::RoundFlap if !matches!(self.view, View::Check(..)) => form.case.flap_line.clear(),
             Action::Session(name) => form.session = name,
             Action::Person(name) => form.settings.person = name,
             Action::Device(at) => {
@@ -349,12 +369,18 @@ impl Host for Desk {
         }
     }
 
-    fn dropped(&mut self, path: PathBuf) {
-        match () {
-            () if matches!(self.view, View::Session(..)) => {}
-            () if path.extension().is_some_and(|end| end == "mcap") => self.take_path(Goal::Recording, path),
-            () if path.join("case.json").is_file() => self.take_path(Goal::Case, path),
-            () => self.view = View::Page(Box::new(pages::sort(&path))),
+    fn dropped(&mut self, paths: Vec<PathBuf>) {
+        if matches!(self.view, View::Session(..)) {
+            return;
+        }
+        self.waiting = browse::together(paths);
+        self.take_waiting();
+    }
+
+    fn hovered(&self) -> String {
+        match self.view {
+            View::Session(..) => "A session runs: end it first, then drop the file on the start page".into(),
+            _ => "Let go here: a CT, an MRI, the folder of a DICOM series, a case folder or a recording".into(),
         }
     }
 }
@@ -368,7 +394,15 @@ impl Desk {
                 *fault =
                     (!found).then_some("There is no bone under this click: turn the head, then click on the skull");
             }),
-            Action::Turn(by) => check.turn(by),
+            Action::Drag(drag) => check.drag(drag).map(|refused| *fault = refused.or(fault.filter(|_| !drag.begins))),
+            Action::Draw(at) => {
+                check.draws = at == 1;
+                Ok(())
+            }
+            Action::RoundFlap => {
+                check.line.clear();
+                Ok(())
+            }
             Action::Blend(share) => {
                 check.blend(share);
                 Ok(())
@@ -379,6 +413,7 @@ impl Desk {
             }
             _ => Ok(()),
         };
+        self.form.case.flap_line = check.line.iter().map(|point| point.to_array()).collect();
         if self.form.case.opening != check.opening {
             self.form.case.opening = check.opening;
             // The case is built anew for another opening.
@@ -404,7 +439,10 @@ impl Desk {
                     *written = text;
                 }
             }
-            Action::Take(goal, path) => self.take_path(goal, path),
+            Action::Take(goal, path) => {
+                self.take_path(goal, path);
+                self.take_waiting();
+            }
             Action::Begin => self.begin(self.form.options(&self.base, self.program)),
             Action::Cancel => {
                 if let View::Session(job, _) = &self.view {
@@ -420,10 +458,16 @@ impl Desk {
                 let options = self.form.options(&self.base, self.program);
                 let lesson = lessons().get(at).map(|lesson| lesson.name.clone());
                 // The lesson brings its own flap.
-                self.begin(options.map(|options| Options { lesson, flap: self.base.flap, ..options }));
+                self.begin(options.map(|options| Options {
+                    lesson,
+                    flap: self.base.flap,
+                    flap_line: Vec::new(),
+                    ..options
+                }));
             }
             Action::Check => self.check(),
-            Action::OpenAt(_) | Action::Turn(_) | Action::Blend(_) | Action::Slide(..) => self.look(action),
+            Action::OpenAt(_) | Action::Drag(_) | Action::Draw(_) | Action::RoundFlap => self.look(action),
+            Action::Blend(_) | Action::Slide(..) => self.look(action),
             Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept(), &lessons()))),
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))

@@ -58,9 +58,8 @@ pub(crate) fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
     let around = Aabb::of_points(&[middle - 4.0 * inward, middle + DEEP_MM * inward]).inflated(reach + 4.0);
     paint(1, around, TEXEL_MM, |place| {
         let aside = |from: Vec3| (place - from).reject_from(inward).length();
-        let rings = [(plan.hole(), plan.hole_mm), (middle, plan.flap_mm)];
-        let on_line = rings.iter().any(|(from, radius)| *radius > 0.0 && (aside(*from) - radius).abs() < LINE_MM);
-        if on_line {
+        let of_lines = [aside(plan.hole()) - plan.hole_mm, plan.beside_mm(place)];
+        if of_lines.iter().any(|mm| mm.abs() < LINE_MM) {
             return coloured(SKY, 0.9);
         }
         let below = brain.filter(|_| aside(middle) < reach).map_or(f32::INFINITY, |field| field.sample(place));

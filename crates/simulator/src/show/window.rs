@@ -23,6 +23,7 @@ use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
+use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
 use trepan_render::window::{self, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter};
@@ -51,6 +52,8 @@ pub(crate) struct Opened<'a> {
     pub slot: usize,
     /// The lesson, if there is one.
     pub guide: Option<Guide>,
+    /// Whether a 3-D mouse turns the view, since it holds no tool.
+    pub knob: bool,
 }
 
 /// What a live session and a replay show alike.
@@ -125,6 +128,8 @@ struct Show {
     /// Whether no flap is planned.
     no_flap: bool,
     guide: Option<Guide>,
+    /// A 3-D mouse in the other hand.
+    knob: Option<SpaceMouse>,
 }
 
 /// Recent requests, each with the time at which it expires, s.
@@ -192,6 +197,7 @@ pub(crate) fn show(
         raycast: Raycast::of(opened.table),
         no_flap: opened.table.plan.outline.is_empty(),
         guide: opened.guide.clone(),
+        knob: opened.knob.then(|| SpaceMouse::open(&spacemouse::Config::default()).ok()).flatten(),
     };
     let (show, album) = run(show, painter, opened, view);
     show.shown.finish(album)
@@ -300,6 +306,7 @@ impl window::Session for Show {
             rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
             wanted_rate_hz: self.wanted_rate_hz,
             actions: (by_hand && self.shown.bone).then(flap).into_iter().chain(lesson.actions).collect(),
+            knob: self.knob.as_mut().map(|knob| knob.velocity(1e3 * input.seconds)).unwrap_or_default(),
             leash: by_hand.then(|| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
             finished,
             ..panel
@@ -450,6 +457,7 @@ mod tests {
             raycast: Raycast::default(),
             no_flap: true,
             guide: None,
+            knob: None,
         };
         let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());
