@@ -83,7 +83,7 @@ proptest! {
     }
 }
 
-/// Angles across cube sizes have no proven bound: the paper proves 1.66° to 174.72° for its cutting
+/// Angles across cube sizes have no proven bound. The paper proves 1.66° to 174.72° for its cutting
 /// of cubes of several sizes with one body; here a node may be moved to another cut. The worst of
 /// 1,200 lattices of noise were 2.1° to 176.4° for one body, 0.7° to 179.0° for more labels.
 #[test]
