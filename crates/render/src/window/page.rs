@@ -406,7 +406,9 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut 
     let shape = image.width as f32 / image.height.max(1) as f32;
     let width = ui.max_rect().width().min(widest).min(picture.height * shape).max(16.0);
     let size = egui::vec2(width, width / shape);
-    let (area, response) = ui.allocate_exact_size(size, egui::Sense::click_and_drag());
+    let (area, _) = ui.allocate_exact_size(size, egui::Sense::hover());
+    // By its name it stays the same while others come and go, so that a drag goes on.
+    let response = ui.interact(area, egui::Id::unique(("picture", &picture.name)), egui::Sense::click_and_drag());
     let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
     ui.painter().image(id, area, whole, Color32::WHITE);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, tr(&picture.name)));
@@ -425,18 +427,21 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut 
         let left = egui::PointerButton::Primary;
         let from = ui.input(|input| input.pointer.press_origin());
         let pointer = ui.input(|input| input.pointer.latest_pos()).unwrap_or(area.min);
-        let drag = |at: egui::Pos2| Drag {
-            by: share(response.drag_delta()),
+        let passes = |at: egui::Pos2| Drag {
             at: share(at - area.min),
             left: response.dragged_by(left) || response.drag_stopped_by(left),
-            begins: false,
-            ends: response.drag_stopped(),
+            ..Drag::default()
         };
         // It counts as a drag only some points after the press.
-        let start =
-            from.filter(|_| response.drag_started()).map(|from| Drag { begins: true, by: [0.0; 2], ..drag(from) });
+        let start = from.filter(|_| response.drag_started()).map(|from| Drag { begins: true, ..passes(from) });
         done.extend(start.map(does));
-        done.push(does(drag(pointer)));
+        // A slow picture comes after several moves.
+        let moves = |input: &egui::InputState| -> Vec<egui::Pos2> {
+            let all = input.events.iter();
+            all.filter_map(|event| if let egui::Event::PointerMoved(at) = event { Some(*at) } else { None }).collect()
+        };
+        done.extend(ui.input(moves).into_iter().map(|at| does(passes(at))));
+        done.push(does(Drag { by: share(response.drag_delta()), ends: response.drag_stopped(), ..passes(pointer) }));
     }
 }
 

@@ -615,3 +615,48 @@ fn no_control_of_a_page_is_cut_off_beside_the_window() {
         assert!(foot.bottom() <= size[1] / scale, "the foot stays in view: {foot}");
     }
 }
+
+#[test]
+fn a_drag_over_a_picture_keeps_every_place_while_the_page_changes() {
+    let page = |drags: &Vec<Drag>| {
+        let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
+        let (letters, clicked) = (Vec::new(), None);
+        let picture =
+            Picture { name: "head".into(), image: (1, image), height: 200.0, letters, clicked, dragged: Some(|d| d) };
+        // Its height grows past the window, so that its parts are laid out another way.
+        let notes = (0..40 * drags.len().min(1)).map(|n| Item::Note(format!("note {n}")));
+        let column = [Item::Picture(picture)].into_iter().chain(notes).collect();
+        Page { title: "Title".into(), columns: vec![column], foot: vec![Item::Note("foot".into())], ..Page::default() }
+    };
+    let mut textures = page::Textures::default();
+    let app = move |ui: &mut egui::Ui, drags: &mut Vec<Drag>| {
+        let done = page::show(ui, &page(drags), &mut textures);
+        drags.extend(done);
+    };
+    let mut harness = Harness::builder().with_size(egui::vec2(800.0, 400.0)).build_ui_state(app, Vec::new());
+    harness.run_steps(3);
+    let area = harness.get_by_label("head").rect();
+    let place = |n: usize| area.lerp_inside(egui::vec2(0.2 + 0.02 * n as f32, 0.5));
+    let button = |pressed| Event::PointerButton {
+        pos: place(if pressed { 0 } else { 20 }),
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Default::default(),
+    };
+    harness.event(Event::PointerMoved(place(0)));
+    harness.step();
+    harness.event(button(true));
+    harness.step();
+    for steps in [1..8, 8..14, 14..21] {
+        steps.for_each(|n| harness.input_mut().events.push(Event::PointerMoved(place(n))));
+        harness.step();
+    }
+    harness.event(button(false));
+    harness.step();
+    let drags = harness.state();
+    assert!(drags[0].begins && drags.last().is_some_and(|last| last.ends), "{drags:?}");
+    for n in 0..=20 {
+        let at = 0.2 + 0.02 * n as f32;
+        assert!(drags.iter().any(|drag| (drag.at[0] - at).abs() < 1e-3), "place {n} of {drags:?}");
+    }
+}

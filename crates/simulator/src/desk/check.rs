@@ -74,6 +74,8 @@ pub(crate) struct Check {
     pub opening: Option<[f32; 3]>,
     /// The line of the flap on the skull, RAS mm, from the burr hole on; empty without one.
     pub line: Vec<Vec3>,
+    /// The line that is being drawn.
+    drawing: Vec<Vec3>,
     /// Whether the left button draws it.
     pub draws: bool,
     made: u64,
@@ -155,7 +157,8 @@ impl Check {
         let slices = std::array::from_fn(|_| (0, blank()));
         let at = head.as_ref().and_then(|head| head.place).map_or(bounds.centre(), |place| place.0);
         let (line, draws, mri) = (line.iter().copied().map(Vec3::from).collect(), false, 0.5);
-        let mut check = Self { case, name, at, mri, bounds, head, slices, opening, line, draws, made: 0 };
+        let mut check =
+            Self { case, name, at, mri, bounds, head, slices, opening, line, drawing: Vec::new(), draws, made: 0 };
         check.draw_slices();
         check.draw_head()?;
         Ok(check)
@@ -204,32 +207,33 @@ impl Check {
     /// Turns the head, or draws the flap's line; returns why the line cannot be cut.
     pub fn drag(&mut self, drag: Drag) -> Result<Option<&'static str>, SessionError> {
         let Some(head) = self.head.as_ref().filter(|_| self.draws && drag.left) else {
-            return self.turn(drag.by).map(|()| None);
+            return if drag.by == [0.0; 2] { Ok(None) } else { self.turn(drag.by).map(|()| None) };
         };
         if drag.begins {
             self.line.clear();
+            self.drawing.clear();
         }
-        let is_new = |point: &Vec3| self.line.last().is_none_or(|last| last.distance(*point) > POINT_MM);
-        self.line.extend(head.under(drag.at).filter(is_new));
+        let is_new = |point: &Vec3| self.drawing.last().is_none_or(|last| last.distance(*point) > POINT_MM);
+        self.drawing.extend(head.under(drag.at).filter(is_new));
         if drag.ends { self.close() } else { Ok(None) }
     }
 
     /// Closes the drawn line; returns why it cannot be cut.
     fn close(&mut self) -> Result<Option<&'static str>, SessionError> {
         let Some(head) = &self.head else { return Ok(None) };
-        let middle = self.line.iter().sum::<Vec3>() / self.line.len().max(1) as f32;
+        let drawn = std::mem::take(&mut self.drawing);
+        let middle = drawn.iter().sum::<Vec3>() / drawn.len().max(1) as f32;
         let inward = (head.centre - middle).normalize_or_zero();
         let around_middle = || Some((first_bone(&head.bone, middle - 20.0 * inward, inward)?, inward));
         let plan = |(entry, inward)| {
             let site = Site { entry, inward, bone_mm: 0.0, brain_mm: 0.0 };
-            Plan::drawn(&head.bone, site, Program::Craniotomy.tray()[0].tip_radius_mm, &self.line)
+            Plan::drawn(&head.bone, site, Program::Craniotomy.tray()[0].tip_radius_mm, &drawn)
         };
         let (is_moved, planned) = match head.place.and_then(plan) {
             Some(plan) => (false, Some(plan)),
             None => (true, around_middle().and_then(plan)),
         };
         let Some(plan) = planned else {
-            self.line.clear();
             return Ok(Some("This line holds no flap: draw it on the skull in one go, around some bone"));
         };
         self.line = plan.outline.iter().map(|rim| rim.outer).collect();
@@ -319,7 +323,7 @@ impl Check {
                 name: "head".into(),
                 image: shown.image.clone(),
                 height: HEAD[1] as f32,
-                letters: shown.marks(&self.line),
+                letters: shown.marks(if self.line.is_empty() { &self.drawing } else { &self.line }),
                 clicked: (!self.draws).then_some(Action::OpenAt),
                 dragged: Some(Action::Drag),
             }));
@@ -351,7 +355,7 @@ impl Check {
                 Item::button("Back to the start page", "the opening is kept", Action::Home),
             ],
             escape: Some(Action::Home),
-            ..Page::default()
+            steady: true,
         }
     }
 
@@ -486,6 +490,8 @@ mod tests {
         let opening = check.opening;
         assert_eq!(draw(&mut check, &ring[..3]).is_some(), check.line.is_empty(), "too small");
         assert!(check.line.is_empty() && draw(&mut check, &[[0.01, 0.01]]).is_some(), "beside the head");
+        let begun = Drag { at: ring[0], left: true, begins: true, ..Drag::default() };
+        assert!(check.drag(begun).unwrap().is_none() && check.line.is_empty(), "it is no flap before it is closed");
         let small: Vec<[f32; 2]> = (0..40).map(|n| place(n as f32 * 0.157, 0.05)).collect();
         assert_eq!((draw(&mut check, &small), check.opening), (None, opening), "around the same opening");
     }
