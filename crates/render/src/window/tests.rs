@@ -5,8 +5,8 @@ use super::app::Window;
 use super::*;
 use crate::{Painter, RenderError, SceneData, SliceLook, View};
 use eframe::egui::{self, Color32, Event, Key, PointerButton, ViewportCommand};
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, LazyRenderer};
 use glam::Vec3;
 use std::sync::Arc;
 use trepan_geometry::Tool;
@@ -86,7 +86,9 @@ impl Bench {
         let microscope = Some(Camera { fov_rad: 0.2, ..Camera::viewed_from(Vec3::ZERO, Vec3::Z, 300.0) });
         let start = Start { microscope, ..Start::with(camera, Pose::from_translation(Vec3::new(0.0, 8.0, 0.0))) };
         let window = Window::new(lent.clone(), start, true);
-        let harness = Harness::builder().with_size(egui::vec2(1280.0, 900.0));
+        // Nothing is rendered, also where another crate asks for the harness's renderer.
+        let none = LazyRenderer::Uninitialized { textures_delta: Default::default(), builder: None };
+        let harness = Harness::builder().with_size(egui::vec2(1280.0, 900.0)).renderer(none);
         let show = |ui: &mut egui::Ui, window: &mut Window<TestSession, TestPainter>| window.show(ui, None);
         let mut bench = Self { window: harness.build_ui_state(show, window), lent };
         bench.window.run_steps(3);
