@@ -34,6 +34,7 @@ mod force_scale;
 mod hand;
 mod ingredients;
 pub mod measure;
+mod mixture;
 mod models;
 mod operation;
 mod options;

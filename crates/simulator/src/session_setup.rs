@@ -26,7 +26,6 @@ use trepan_link::Recording;
 use trepan_measurements::support;
 use trepan_mesh::TetMesh;
 use trepan_rigid::{Extent, Method};
-use trepan_soft::Body;
 use trepan_volume::{BoneVolume, Piece};
 use trepan_voxel_size::{CostModel, Measures};
 
@@ -185,13 +184,7 @@ impl SessionSetup {
 
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
         let (Held { fixed, anchors, mut wall }, settling) = self.held(brain)?;
-        let body = Body {
-            mesh: brain.mesh.clone(),
-            fixed,
-            anchors,
-            materials: with.materials(self.young_mpa),
-            material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
-        };
+        let body = brain.body(with.materials(self.young_mpa), fixed, anchors);
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
         let _first = self.ran.set(ran);
         let touch = touch(&brain.mesh, with)?;

@@ -146,6 +146,14 @@ impl Body {
         Self { anchors: self.anchors, ..Self::uniform(self.mesh, self.fixed, material) }
     }
 
+    /// For each material the number of the first one with its bulk modulus, within 0.1 %. Averaged
+    /// pressure is taken over the elements of one number around a node.
+    pub fn bulk_groups(&self) -> Vec<u8> {
+        let bulk: Vec<f64> = self.materials.iter().map(Material::bulk_mpa).collect();
+        let first = |of: &f64| bulk.iter().position(|other| (of / other - 1.0).abs() < 1e-3).unwrap_or_default() as u8;
+        bulk.iter().map(first).collect()
+    }
+
     pub(crate) fn elements(&self) -> Vec<Element> {
         let of = |(t, &corners): (usize, &[u32; 4])| Element {
             corners,

@@ -71,7 +71,7 @@ impl Tangent {
     /// when every node is fixed or memory is out.
     pub fn of(body: &Body, averaged_pressure: bool) -> Option<Self> {
         let (elements, fixed) = (body.elements(), body.fixed_mask());
-        let groups = if averaged_pressure { groups(&elements) } else { Vec::new() };
+        let groups = if averaged_pressure { groups(&elements, &body.bulk_groups()) } else { Vec::new() };
         let cells = elements.iter().map(|e| &e.corners[..]).chain(groups.iter().map(|g| &g.nodes[..]));
         let factor = Factor::of(&fixed, cells)?;
         let laws: Vec<Law> = body.materials.iter().map(crate::Material::law).collect();
@@ -212,10 +212,11 @@ impl Tangent {
 }
 
 /// The node groups of some elements.
-fn groups(elements: &[Element]) -> Vec<Group> {
+fn groups(elements: &[Element], bulk_groups: &[u8]) -> Vec<Group> {
     let mut around: BTreeMap<(u32, u8), Vec<u32>> = BTreeMap::new();
     for (t, element) in elements.iter().enumerate() {
-        element.corners.iter().for_each(|&n| around.entry((n, element.material)).or_default().push(t as u32));
+        let bulk = bulk_groups[usize::from(element.material)];
+        element.corners.iter().for_each(|&n| around.entry((n, bulk)).or_default().push(t as u32));
     }
     let group = |elements_of: Vec<u32>| {
         let of = |&t: &u32| &elements[t as usize];

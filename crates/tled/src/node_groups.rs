@@ -1,4 +1,4 @@
-//! Node groups: the elements of one material around one node, over which volumes are averaged.
+//! Node groups: the elements of one bulk modulus around a node, over which volumes are averaged.
 //!
 //! # Theory
 //! Averaged nodal pressure has the energy `Σ_s κ V_s/2 (J_s - 1)²` over node groups s. Each element
@@ -8,18 +8,19 @@
 //! ```
 //! With a single group per node for all materials the forces would not derive from an energy, and
 //! the simulation would diverge where neighbours differ in stiffness by 1:1000. With one group per
-//! material a bar of two materials is exact.
+//! bulk modulus a bar of two materials is exact.
 
 use trepan_soft::Body;
 use trepan_soft::simd::Layout;
 
-/// The node groups of a body: one per node, more where materials meet and volumes are averaged.
+/// The node groups of a body: one per node, more where bulk moduli meet and volumes are averaged.
 pub(crate) struct NodeGroups {
     /// Place of every group's node, ascending.
     pub place_of: Vec<u32>,
-    /// Material of every group; 0 where materials share one.
-    material_of: Vec<u8>,
-    apart: bool,
+    /// First material with the group's bulk modulus; 0 where all share one.
+    bulk_of: Vec<u8>,
+    /// The same of each material.
+    bulk_groups: Vec<u8>,
 }
 
 /// Slots sorted by node group: one run of them belongs to a group, a longer one to a place.
@@ -32,24 +33,25 @@ pub(crate) struct Runs {
 }
 
 impl NodeGroups {
-    /// Creates one group per material at a node if `apart`, else one per node.
+    /// Creates one group per bulk modulus at a node if `apart`, else one per node.
     pub fn of(body: &Body, layout: &Layout, apart: bool) -> Self {
-        let key = |t: usize| if apart { body.material_of_tet[t] } else { 0 };
+        let bulk_groups = if apart { body.bulk_groups() } else { vec![0; body.materials.len()] };
+        let key = |t: usize| bulk_groups[usize::from(body.material_of_tet[t])];
         let of_tet = |(t, tet): (usize, &[u32; 4])| tet.map(|n| (layout.place_of[n as usize], key(t)));
         let mut node_groups: Vec<(u32, u8)> = body.mesh.tets.iter().enumerate().flat_map(of_tet).collect();
         node_groups.sort_unstable();
         node_groups.dedup();
-        let (place_of, material_of) = node_groups.into_iter().unzip();
-        Self { place_of, material_of, apart }
+        let (place_of, bulk_of) = node_groups.into_iter().unzip();
+        Self { place_of, bulk_of, bulk_groups }
     }
 
     /// Node groups of a tetrahedron's corners.
     pub fn of_tet(&self, body: &Body, layout: &Layout, tet: u32) -> [u32; 4] {
-        let material = if self.apart { body.material_of_tet[tet as usize] } else { 0 };
+        let bulk = self.bulk_groups[usize::from(body.material_of_tet[tet as usize])];
         body.mesh.tets[tet as usize].map(|n| {
             let place = layout.place_of[n as usize];
             let mut group = self.place_of.partition_point(|&p| p < place);
-            while self.material_of[group] != material {
+            while self.bulk_of[group] != bulk {
                 group += 1;
             }
             group as u32

@@ -39,7 +39,7 @@ pub fn read_labelled(path: &Path) -> Result<LabelledMesh, FileError> {
     file.header()?;
     let mesh = file.body()?;
     let label_of_tet = file.labels(mesh.tets.len())?;
-    Ok(LabelledMesh { mesh, label_of_tet })
+    Ok(LabelledMesh { mesh, label_of_tet, ..LabelledMesh::default() })
 }
 
 pub(crate) fn parse(reader: Reader) -> Result<TetMesh, FileError> {
@@ -267,7 +267,7 @@ mod tests {
         let path = folder.path().join("labelled.vtk");
         let mesh = octahedron();
         let label_of_tet = (0..mesh.tets.len()).map(|tet| 1 + 300 * tet as u16).collect();
-        let labelled = LabelledMesh { mesh, label_of_tet };
+        let labelled = LabelledMesh { mesh, label_of_tet, ..LabelledMesh::default() };
         write_labelled(&path, &labelled).unwrap();
         let back = read_labelled(&path).unwrap();
         assert_eq!((&back.mesh, &back.label_of_tet), (&labelled.mesh, &labelled.label_of_tet));
@@ -292,7 +292,7 @@ mod tests {
     fn labels_follow_the_grid_as_cell_data() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("labelled.vtk");
-        let labelled = LabelledMesh { mesh: octahedron(), label_of_tet: vec![7, 258, 7, 7] };
+        let labelled = LabelledMesh { mesh: octahedron(), label_of_tet: vec![7, 258, 7, 7], ..LabelledMesh::default() };
         write_labelled(&path, &labelled).unwrap();
         assert_eq!(read(&path).unwrap(), labelled.mesh);
         let tail = b"LOOKUP_TABLE default\n\x00\x07\x01\x02\x00\x07\x00\x07\n";

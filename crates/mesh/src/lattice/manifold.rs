@@ -11,7 +11,7 @@ use super::LabelledMesh;
 use crate::{NONE, TetMesh, Topology};
 
 /// The largest face-connected part of a mesh, with a manifold surface.
-pub(super) fn repaired(LabelledMesh { mut mesh, mut label_of_tet }: LabelledMesh) -> LabelledMesh {
+pub(super) fn repaired(LabelledMesh { mut mesh, mut label_of_tet, .. }: LabelledMesh) -> LabelledMesh {
     loop {
         let topology = Topology::of(&mesh);
         let mut doomed = outside_largest(&mesh, &topology);
@@ -19,7 +19,7 @@ pub(super) fn repaired(LabelledMesh { mut mesh, mut label_of_tet }: LabelledMesh
             mark_pinches(&mesh, &topology, &mut doomed);
         }
         if !doomed.contains(&true) {
-            return LabelledMesh { mesh: mesh.without_orphans(), label_of_tet };
+            return LabelledMesh { mesh: mesh.without_orphans(), label_of_tet, ..LabelledMesh::default() };
         }
         let (mut keep, mut keep_label) = (doomed.iter().map(|d| !d), doomed.iter().map(|d| !d));
         mesh.tets.retain(|_| keep.next().unwrap_or(true));
@@ -198,7 +198,8 @@ mod tests {
     fn the_larger_of_two_parts_sharing_an_edge_is_kept() {
         let positions = vec![Vec3::ZERO, Vec3::Z, 2.0 * Vec3::X, Vec3::Y, Vec3::NEG_X, Vec3::NEG_Y];
         let mesh = TetMesh { positions, tets: vec![[0, 4, 5, 1], [0, 2, 3, 1]] };
-        let LabelledMesh { mesh, label_of_tet } = repaired(LabelledMesh { mesh, label_of_tet: vec![4, 7] });
+        let labelled = LabelledMesh { mesh, label_of_tet: vec![4, 7], ..LabelledMesh::default() };
+        let LabelledMesh { mesh, label_of_tet, .. } = repaired(labelled);
         assert_eq!(label_of_tet, [7]);
         assert_eq!(mesh.tets.len(), 1);
         assert!((mesh.total_mm3() - 2.0 / 6.0).abs() < 1e-6);

@@ -9,6 +9,10 @@
 //! convex parts and smoothing shrinks them; the level compensates both. Finally nodes move to
 //! increase the height of the flattest elements.
 //!
+//! The outer surface is found first, as if there were one label, and stays: only then is the inside
+//! divided. Structures thicker than a few cubes get borders of their own; where labels are thinner,
+//! tetrahedra are not cut but take them by their shares of the volume.
+//!
 //! # Practice
 //! World mm; any affine. Equal labels give bit-identical results for any number of threads.
 //!
@@ -18,7 +22,7 @@
 //!
 //! # When not to use it
 //! For sharp edges or surfaces that must interpolate given points (they are rounded at the scale of
-//! a), and for layers thinner than about 2 a (they may break up). Where three labels meet, their
+//! a), and for bodies thinner than about 2 a (they may break up). Where three labels meet, their
 //! common line is accurate to about half of a only.
 
 mod blur;
@@ -31,7 +35,9 @@ mod search;
 mod stencil;
 #[cfg(test)]
 mod stencil_bounds;
+mod thick;
 
+use crate::materials::{self, Share};
 use crate::{MeshError, TetMesh};
 use regions::Regions;
 use trepan_geometry::Vec3;
@@ -52,6 +58,10 @@ pub struct Config {
     pub coarsening: u32,
     /// Region with a finer boundary.
     pub fine: Option<Fine>,
+    /// Least thickness of a label with borders of its own, in spacings of the cubes there, 0 or
+    /// more; a layer at the outer surface needs half. Thinner ones become shares of tetrahedra, all
+    /// of them at infinity. Under 1.5 borders may be ragged and labels lost.
+    pub least_thickness: f64,
 }
 
 /// A ball with smaller elements: the planned opening.
@@ -68,20 +78,23 @@ pub struct Fine {
 
 /// A mesh with a label for each tetrahedron.
 ///
-/// Labels meet in triangles shared by the tetrahedra of both sides.
+/// Labels with borders of their own meet in triangles shared by the tetrahedra of both sides.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelledMesh {
     /// All tetrahedra.
     pub mesh: TetMesh,
-    /// The volume's label of each tetrahedron; never 0.
+    /// The volume's label of each tetrahedron; never 0. Of several the one with the largest share.
     pub label_of_tet: Vec<u16>,
+    /// The labels of tetrahedra in the region where labels have no borders of their own, ascending
+    /// by tetrahedron, then label. Empty if there is no such region.
+    pub shares: Vec<Share>,
 }
 
 impl Default for Config {
     /// A brain for a whole operation: fine enough to deform smoothly, coarse enough for real time
     /// on a CPU.
     fn default() -> Self {
-        Self { target_tets: 15_000, smoothing: 0.3, coarsening: 0, fine: None }
+        Self { target_tets: 15_000, smoothing: 0.3, coarsening: 0, fine: None, least_thickness: 2.0 }
     }
 }
 
@@ -94,29 +107,36 @@ pub fn tetrahedra(mask: &VoxelVolume<u8>, config: &Config) -> Result<TetMesh, Me
 
 /// Fills the largest 6-connected labelled part (nonzero voxels) with tetrahedra of one label each.
 ///
-/// The mesh is as valid as that of [`tetrahedra`]. Label boundaries follow the voxels like the
-/// outer surface. Each label keeps the volume of its voxels within 0.2 % or one tetrahedron where
-/// the lattice can resolve it. A label smaller than a few cubes may be lost.
+/// The mesh is as valid as that of [`tetrahedra`], and has its outer surface: with `coarsening` 0
+/// the same bits (but where nodes move for the height of an element) as long as labels add less
+/// than 10 % of the tetrahedra. Borders between labels follow the voxels like the outer surface.
+/// Each label with a border keeps the volume of its voxels within 0.2 % or one tetrahedron; the
+/// others keep theirs in `shares`.
 pub fn labelled(labels: &VoxelVolume<u16>, config: &Config) -> Result<LabelledMesh, MeshError> {
     Domain::of(labels, config)?.labelled(config)
 }
 
-/// A label volume prepared for several meshes: the distance to each label's boundary.
+/// A label volume prepared for several meshes: the distance to the outer surface.
 ///
-/// The distances take most of the time of a mesh of few tetrahedra.
+/// It takes most of the time of a mesh of few tetrahedra.
 pub struct Domain {
-    regions: Regions,
+    labels: VoxelVolume<u16>,
+    whole: Regions,
 }
 
+/// Most times that the outer surface is searched anew because labels add too many tetrahedra.
+const ROUNDS: usize = 4;
+
 impl Domain {
-    /// Computes the distances, with a margin for the smoothing of the coarsest mesh that is wanted.
+    /// Computes the distance, with a margin for the smoothing of the coarsest mesh that is wanted.
     ///
     /// # Errors
     /// If the volume has no labels or too many, or a setting is out of range.
     pub fn of(labels: &VoxelVolume<u16>, coarsest: &Config) -> Result<Self, MeshError> {
         check_config(coarsest)?;
         let most_mm = |mm3| coarsest.smoothing * search::uniform_spacing(mm3, coarsest.target_tets);
-        Ok(Self { regions: Regions::of(labels, most_mm)? })
+        let labels = regions::largest_part(labels)?;
+        Ok(Self { whole: Regions::whole(&labels, most_mm), labels })
     }
 
     /// Fills the labels with tetrahedra, as the function [`labelled`].
@@ -125,12 +145,55 @@ impl Domain {
     /// If a setting is out of range or no mesh has about the requested count.
     pub fn labelled(&self, config: &Config) -> Result<LabelledMesh, MeshError> {
         check_config(config)?;
-        let mut regions = self.regions.clone();
-        let spacing = search::first_spacing(&regions, config);
-        regions.smooth(config.smoothing * spacing);
-        let mut labelled = search::search(&mut regions, config, spacing)?;
+        let wanted = config.target_tets;
+        let mut aim = *config;
+        let mut nearest = 0;
+        for _ in 0..ROUNDS {
+            let mut whole = self.whole.clone();
+            let spacing = search::first_spacing(&whole, &aim);
+            whole.smooth(aim.smoothing * spacing);
+            let found = search::search(&mut whole, &aim, spacing)?;
+            let borders = thick::resolved(&self.labels, &aim, found.spacing);
+            let mut divided = whole.divided(&borders, aim.smoothing * spacing);
+            let has_one = divided.names.len() == 2;
+            let found = if has_one { found } else { search::divide(&mut divided, &aim, &found) };
+            nearest = found.labelled.mesh.tets.len();
+            if search::meets(nearest, wanted) {
+                return Ok(self.finished(found, if has_one { &whole } else { &divided }, &borders));
+            }
+            aim.target_tets = (aim.target_tets as f64 * wanted as f64 / nearest.max(1) as f64) as usize;
+            aim.target_tets = aim.target_tets.max(100);
+        }
+        Err(MeshError::Target { wanted, nearest })
+    }
+
+    /// Moves nodes of flat elements, and gives each tetrahedron its labels.
+    fn finished(&self, found: search::Found, regions: &Regions, borders: &VoxelVolume<u16>) -> LabelledMesh {
+        let mut labelled = found.labelled;
+        polish::polish(&mut labelled, found.spacing, regions);
         labelled.label_of_tet.iter_mut().for_each(|label| *label = regions.names[usize::from(*label)]);
-        Ok(labelled)
+        let differs = |(label, border): (&u16, &u16)| label != border;
+        let Some(at) = self.labels.data.iter().zip(&borders.data).position(differs) else { return labelled };
+        let host = borders.data[at];
+        let mut thin = self.labels.clone();
+        thin.data.iter_mut().zip(&borders.data).for_each(|(label, border)| *label *= u16::from(*border == host));
+        let all = materials::shares(&labelled.mesh, &thin, |tet| labelled.label_of_tet[tet] == host);
+        for of_tet in all.chunk_by(|a, b| a.tet == b.tet) {
+            let most = of_tet.iter().max_by(|a, b| a.share.total_cmp(&b.share).then(b.label.cmp(&a.label)));
+            labelled.label_of_tet[of_tet[0].tet as usize] = most.map_or(host, |most| most.label);
+            labelled.shares.extend(of_tet);
+        }
+        labelled
+    }
+}
+
+impl Config {
+    /// A brain with an opening: with small elements there, whose surface is smoothed as little as
+    /// voxels allow.
+    pub fn with_opening(target_tets: usize, fine: Option<Fine>) -> Self {
+        let usual = Self::default();
+        let smoothing = if fine.is_some() { usual.smoothing / 3.0 } else { usual.smoothing };
+        Self { target_tets, smoothing, fine, ..usual }
     }
 }
 
@@ -141,6 +204,7 @@ fn check_config(config: &Config) -> Result<(), MeshError> {
         ("target_tets", config.target_tets as f64, 100.0..=2e7, "100 to 20000000"),
         ("smoothing", config.smoothing, 0.0..=2.0, "0 to 2 lattice spacings"),
         ("coarsening", f64::from(config.coarsening), 0.0..=6.0, "0 to 6 doublings"),
+        ("least_thickness", config.least_thickness, 0.0..=f64::INFINITY, "0 or more lattice spacings"),
         ("fine.centre", f64::from(off), 0.0..=1e6, "finite, within a kilometre"),
         ("fine.radius_mm", f64::from(fine.radius_mm), 1e-3..=1e6, "0.001 to 1000000 mm"),
         ("fine.halvings", f64::from(fine.halvings), 1.0..=4.0, "1 to 4"),
@@ -204,7 +268,7 @@ mod tests {
 
     /// The boundary surface of one label's tetrahedra.
     fn border_of(labelled: &LabelledMesh, label: u16) -> (TetMesh, Surface) {
-        let LabelledMesh { mesh, label_of_tet } = labelled;
+        let LabelledMesh { mesh, label_of_tet, .. } = labelled;
         let tets = mesh.tets.iter().zip(label_of_tet).filter(|(_, l)| **l == label).map(|(t, _)| *t).collect();
         let part = TetMesh { positions: mesh.positions.clone(), tets }.without_orphans();
         let surface = Surface::of(&part);
@@ -231,6 +295,68 @@ mod tests {
         for node in border.nodes() {
             let radius = inner.positions[node as usize].length();
             assert!((radius - 14.0).abs() < 0.5, "{radius}");
+        }
+    }
+
+    /// A folded body: a ball with a wavy surface, whose outer shell follows the waves.
+    fn folded(p: DVec3) -> u16 {
+        let radius = 24.0 + 2.5 * (0.6 * p.x).sin() * (0.5 * p.y).cos() - p.length();
+        match radius {
+            r if r < 0.0 => 0,
+            r if r < 3.0 => 3,
+            _ if p.length() < 8.0 => 4,
+            _ if p.x > 3.0 && p.y > -2.0 => 7,
+            _ => 2,
+        }
+    }
+
+    #[test]
+    fn whatever_lies_inside_the_outer_surface_is_that_of_the_unlabelled_body() {
+        let labels = volume_with([64; 3], millimetres(64), folded);
+        let fine = Some(Fine { centre: Vec3::new(0.0, 0.0, 25.0), radius_mm: 6.0, halvings: 2 });
+        for (target_tets, fine) in [(1_500, None), (6_000, None), (6_000, fine)] {
+            let with = |least_thickness| Config { target_tets, fine, least_thickness, ..Config::default() };
+            let plain = tetrahedra(&labels.map(|label| label as u8), &with(2.0)).unwrap();
+            let mixed = labelled(&labels, &with(f64::INFINITY)).unwrap();
+            assert_eq!(mixed.mesh, plain);
+            let some = labelled(&labels, &with(2.0)).unwrap();
+            assert!(some.mesh.tets.len().abs_diff(target_tets) * 10 <= target_tets);
+            // As cut they are the same bits (`stencil_bounds`); then nodes move for the height of elements.
+            let [of_plain, of_some] = [&plain, &some.mesh].map(|mesh| (Surface::of(mesh), mesh));
+            assert_eq!(of_some.0.triangles.len(), of_plain.0.triangles.len());
+            let [area, of_some] = [of_plain, of_some].map(|(surface, mesh)| surface.area_mm2(&mesh.positions));
+            assert!((of_some / area - 1.0).abs() < 2e-3, "{of_some} {area}");
+            // Even where every label has borders, which takes coarser cubes.
+            let all = labelled(&labels, &with(0.0)).unwrap();
+            assert!(all.shares.is_empty());
+            let area = |mesh: &TetMesh| Surface::of(mesh).area_mm2(&mesh.positions);
+            assert!((area(&all.mesh) / area(&plain) - 1.0).abs() < 0.02, "{}", area(&all.mesh) / area(&plain));
+        }
+    }
+
+    #[test]
+    fn thin_labels_become_shares_that_keep_their_volume_and_thick_ones_keep_their_border() {
+        let labels = volume_with([64; 3], millimetres(64), |p| match p.length() {
+            r if r < 14.0 => 9,
+            r if r < 25.0 => 5,
+            r if r < 27.0 => 6,
+            _ => 0,
+        });
+        let meshed = labelled(&labels, &Config { target_tets: 8_000, ..Config::default() }).unwrap();
+        assert_sound(&meshed.mesh, 8_000, 4.0 / 3.0 * std::f64::consts::PI * 27f64.powi(3));
+        let mixed = |label: u16| -> f64 {
+            let of_label = meshed.shares.iter().filter(|share| share.label == label);
+            of_label.map(|share| f64::from(share.share) * meshed.mesh.volume_mm3(share.tet as usize)).sum()
+        };
+        let voxels = |label: u16| labels.data.iter().filter(|l| **l == label).count() as f64;
+        assert_eq!(mixed(9), 0.0);
+        assert!((volume_of(&meshed, 9) / voxels(9) - 1.0).abs() < 0.01);
+        assert!(border_of(&meshed, 9).1.is_closed());
+        for label in [5, 6] {
+            assert!((mixed(label) / voxels(label) - 1.0).abs() < 0.03, "{label}: {} {}", mixed(label), voxels(label));
+        }
+        for of_tet in meshed.shares.chunk_by(|a, b| a.tet == b.tet) {
+            assert!((of_tet.iter().map(|share| share.share).sum::<f32>() - 1.0).abs() < 1e-5);
         }
     }
 
@@ -311,7 +437,8 @@ mod tests {
                 2 + u16::from(p.y > 0.4 * p.z)
             }
         });
-        let labelled = labelled(&labels, &Config { target_tets: 10_000, ..Config::default() }).unwrap();
+        let config = Config { target_tets: 10_000, least_thickness: 0.0, ..Config::default() };
+        let labelled = labelled(&labels, &config).unwrap();
         assert_sound(&labelled.mesh, 10_000, 4.0 / 3.0 * std::f64::consts::PI * 8000.0);
         for label in 1..4 {
             let voxels = labels.data.iter().filter(|l| **l == label).count() as f64;

@@ -149,6 +149,10 @@ mod tests {
         fn label_at(&self, _: DVec3) -> u16 {
             0
         }
+
+        fn inner_at(&self, _: DVec3) -> u16 {
+            0
+        }
     }
 
     #[test]
@@ -159,7 +163,7 @@ mod tests {
         };
         let before = mesh.clone();
         assert_eq!(mesh.check(), Ok(()));
-        let mut labelled = LabelledMesh { mesh, label_of_tet: vec![1; 4] };
+        let mut labelled = LabelledMesh { mesh, label_of_tet: vec![1; 4], ..LabelledMesh::default() };
         polish(&mut labelled, 4.0, &Nowhere);
         let mesh = labelled.mesh;
         assert_eq!(mesh.check(), Ok(()));

@@ -30,6 +30,9 @@ pub(super) trait Partition: Sync {
     /// The label of a point.
     fn label_at(&self, p: DVec3) -> u16;
 
+    /// The label of a point that counts as inside.
+    fn inner_at(&self, p: DVec3) -> u16;
+
     /// Of some labels the one with the largest value at a point; the first on a tie.
     fn strongest(&self, among: &[u16], p: DVec3) -> u16 {
         let stronger = |best: u16, &label: &u16| if self.lead(label, best, p) > 0.0 { label } else { best };
@@ -56,34 +59,49 @@ pub(super) struct Regions {
     fine: Option<(Fine, f64)>,
 }
 
-/// By how many finest edges from a finer region on the edge has grown by one more.
-const GROWTH: f64 = 1.5;
+/// Distance from a finer region over the edge of the cubes there, beyond the finest: cubes of one
+/// size are two deep, and begin where their corners leave the region.
+pub(super) const GROWTH: f64 = 3.0;
 
 impl Regions {
-    /// The unsmoothed regions with a margin for smoothing up to `most_mm`.
-    pub(super) fn of(labels: &VoxelVolume<u16>, most_mm: impl FnOnce(f64) -> f64) -> Result<Self, MeshError> {
-        check_volume(labels)?;
-        let mut labels = labels.clone();
-        let part = largest_component(&labels.map(|l| u8::from(l != 0)));
-        labels.data.iter_mut().zip(&part.data).for_each(|(label, kept)| *label *= u16::from(*kept));
-        let blocks = Block::of_each(&labels);
-        let names: Vec<u16> = std::iter::once(0).chain(blocks.iter().map(|(name, _)| *name)).collect();
-        if blocks.is_empty() {
-            return Err(MeshError::EmptyMask);
+    /// All labels as one region, not smoothed, with a margin for smoothing up to `most_mm` (by the
+    /// volume, mm³).
+    pub(super) fn whole(labels: &VoxelVolume<u16>, most_mm: impl FnOnce(f64) -> f64) -> Self {
+        let blocks = Block::of_each(labels);
+        let block = blocks.iter().skip(1).fold(blocks[0].1, |whole, (_, block)| whole.with(block));
+        let mm3 = block.voxels as f64 * labels.voxel_mm3();
+        let field = Field::of(labels, &block, most_mm(mm3), |label| label != 0);
+        Self {
+            names: vec![0, blocks[0].0],
+            mm3: vec![0.0, mm3],
+            levels: vec![0.0; 2],
+            bounds: block.world_box(labels),
+            fields: vec![field],
+            union: None,
+            fine: None,
         }
-        if blocks.len() > MOST_LABELS {
-            let got = format!("{} labels", blocks.len());
-            return Err(MeshError::Mask { field: "data", got, wanted: "at most 255 of them; is it an image?" });
+    }
+
+    /// These regions, smoothed before, divided by their labels, which are smoothed by `sigma_mm`.
+    pub(super) fn divided(&self, labels: &VoxelVolume<u16>, sigma_mm: f64) -> Self {
+        let blocks = Block::of_each(labels);
+        let names = std::iter::once(0).chain(blocks.iter().map(|(name, _)| *name)).collect();
+        let volume = |(_, block): &(u16, Block)| block.voxels as f64 * labels.voxel_mm3();
+        let field = |(name, block): &(u16, Block)| {
+            let mut field = Field::of(labels, block, sigma_mm, |label| label == *name);
+            field.smooth(sigma_mm);
+            field
+        };
+        let mut levels = vec![0.0; blocks.len() + 1];
+        levels[0] = self.levels[0];
+        Self {
+            names,
+            mm3: std::iter::once(0.0).chain(blocks.iter().map(volume)).collect(),
+            levels,
+            fields: blocks.iter().map(field).collect(),
+            union: Some(self.fields[0].clone()),
+            ..*self
         }
-        let count = |block: &Block| block.voxels as f64 * labels.voxel_mm3();
-        let mm3: Vec<f64> = std::iter::once(0.0).chain(blocks.iter().map(|(_, block)| count(block))).collect();
-        let most_mm = most_mm(mm3.iter().sum());
-        let field = |name: u16, block: &Block| Field::of(&labels, block, most_mm, |label| label == name);
-        let fields = blocks.iter().map(|(name, block)| field(*name, block)).collect();
-        let whole = blocks.iter().skip(1).fold(blocks[0].1, |whole, (_, block)| whole.with(block));
-        let union = (blocks.len() > 1).then(|| Field::of(&labels, &whole, most_mm, |label| label != 0));
-        let levels = vec![0.0; names.len()];
-        Ok(Self { names, mm3, levels, bounds: whole.world_box(&labels), fields, union, fine: None })
     }
 
     /// Smooths all φ with a Gaussian of `sigma_mm`.
@@ -100,7 +118,7 @@ impl Regions {
     fn share(&self, p: DVec3) -> f64 {
         self.fine.map_or(1.0, |(fine, edge_mm)| {
             let away = p.distance(fine.centre.as_dvec3()) - f64::from(fine.radius_mm);
-            let edges = 1.0 + away.max(0.0) / (GROWTH * edge_mm);
+            let edges = (away / (GROWTH * edge_mm)).max(1.0);
             (edges / f64::from(1u32 << fine.halvings)).min(1.0).powi(2)
         })
     }
@@ -140,9 +158,10 @@ impl Partition for Regions {
     }
 
     fn label_at(&self, p: DVec3) -> u16 {
-        if self.inside(p) <= 0.0 {
-            return 0;
-        }
+        if self.inside(p) <= 0.0 { 0 } else { self.inner_at(p) }
+    }
+
+    fn inner_at(&self, p: DVec3) -> u16 {
         let mut best = (f64::NEG_INFINITY, 1);
         for label in (1..self.names.len() as u16).filter(|&label| self.fields[usize::from(label) - 1].contains(p)) {
             let hold = self.hold(label, p);
@@ -151,6 +170,25 @@ impl Partition for Regions {
             }
         }
         best.1
+    }
+}
+
+/// The largest 6-connected labelled part.
+///
+/// # Errors
+/// If the volume is not one of labels, or has none.
+pub(super) fn largest_part(labels: &VoxelVolume<u16>) -> Result<VoxelVolume<u16>, MeshError> {
+    check_volume(labels)?;
+    let mut labels = labels.clone();
+    let part = largest_component(&labels.map(|l| u8::from(l != 0)));
+    labels.data.iter_mut().zip(&part.data).for_each(|(label, kept)| *label *= u16::from(*kept));
+    match Block::of_each(&labels).len() {
+        0 => Err(MeshError::EmptyMask),
+        1..=MOST_LABELS => Ok(labels),
+        count => {
+            let got = format!("{count} labels");
+            Err(MeshError::Mask { field: "data", got, wanted: "at most 255 of them; is it an image?" })
+        }
     }
 }
 

@@ -10,7 +10,7 @@
 
 use super::octree::{Cube, Lattice};
 use super::regions::{Partition, Regions};
-use super::{Config, LabelledMesh, manifold, polish, stencil};
+use super::{Config, LabelledMesh, manifold, stencil};
 use crate::{FACES, MeshError, NONE, TetMesh, Topology};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -51,47 +51,73 @@ pub(super) fn first_spacing(regions: &Regions, config: &Config) -> f64 {
     spacing
 }
 
+/// A mesh and the lattice that it is cut from.
+pub(super) struct Found {
+    /// Labels are indices of regions.
+    pub(super) labelled: LabelledMesh,
+    /// Spacing of the finest cubes, mm.
+    pub(super) spacing: f64,
+    trial: usize,
+}
+
 /// Searches the mesh nearest to the request; leaves the boundary levels in `regions`.
-pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -> Result<LabelledMesh, MeshError> {
+pub(super) fn search(regions: &mut Regions, config: &Config, spacing: f64) -> Result<Found, MeshError> {
+    let found = nearest(regions, config, (spacing, 0), false);
+    let nearest = found.labelled.mesh.tets.len();
+    if meets(nearest, config.target_tets) {
+        return Ok(found);
+    }
+    Err(MeshError::Target { wanted: config.target_tets, nearest })
+}
+
+/// Divides a mesh by labels: same lattice, same outer surface. Searches the levels between labels.
+pub(super) fn divide(regions: &mut Regions, config: &Config, whole: &Found) -> Found {
+    nearest(regions, config, (whole.spacing, whole.trial), true)
+}
+
+/// Whether a count is within the documented tolerance.
+pub(super) fn meets(tets: usize, wanted: usize) -> bool {
+    tets.abs_diff(wanted) * 10 <= wanted
+}
+
+/// Searches the mesh nearest to the request from a spacing and the number of a trial on, which both
+/// stay if the surface is given.
+fn nearest(regions: &mut Regions, config: &Config, (mut spacing, first): (f64, usize), is_given: bool) -> Found {
     let wanted = config.target_tets;
     let power = if levels(config) == 0 { 1.0 / 3.0 } else { 0.4 };
-    let meets = |tets: usize| tets.abs_diff(wanted) * 10 <= wanted;
     // A mesh that meets the count is better than any that does not.
-    let mut best = ((true, f64::INFINITY), LabelledMesh::default(), regions.levels.clone(), spacing);
+    let mut best = ((true, f64::INFINITY), regions.levels.clone());
+    let mut found = Found { labelled: LabelledMesh::default(), spacing, trial: first };
     let mut stride = Stride::of(regions.names.len());
     for trial in 0..TRIALS {
         regions.refine(config.fine, spacing);
+        let trial = if is_given { first } else { trial };
         let Some(lattice) = lattice(regions, config, spacing, trial) else { break };
         let labelled = manifold::repaired(stencil::stuff(&lattice, regions));
         if labelled.mesh.tets.is_empty() {
-            spacing *= 0.7;
+            spacing *= if is_given { 1.0 } else { 0.7 };
             continue;
         }
         let share = labelled.mesh.tets.len() as f64 / wanted as f64;
         let balance = Balance::of(&labelled, regions);
-        let volume_fault = balance.fault(regions, spacing);
-        let fault = ((share - 1.0).abs() / COUNT_TOLERANCE).max(volume_fault);
-        let rank = (!meets(labelled.mesh.tets.len()), fault);
+        let count_fault = if is_given { 0.0 } else { (share - 1.0).abs() / COUNT_TOLERANCE };
+        let fault = count_fault.max(balance.fault(regions, spacing));
+        let rank = (!is_given && !meets(labelled.mesh.tets.len(), wanted), fault);
         if rank < best.0 {
-            best = (rank, labelled, regions.levels.clone(), spacing);
+            best = (rank, regions.levels.clone());
+            found = Found { labelled, spacing, trial };
         }
         if fault < 1.0 {
             break;
         }
-        stride.go(&mut regions.levels, &balance, spacing);
-        if (share - 1.0).abs() > 0.5 * COUNT_TOLERANCE {
+        stride.go(&mut regions.levels, &balance, spacing, is_given);
+        if !is_given && (share - 1.0).abs() > 0.5 * COUNT_TOLERANCE {
             spacing *= share.powf(power).clamp(0.5, 2.0);
         }
     }
-    let (_, mut labelled, levels, spacing) = best;
-    regions.levels = levels;
-    let nearest = labelled.mesh.tets.len();
-    if !meets(nearest) {
-        return Err(MeshError::Target { wanted, nearest });
-    }
-    regions.refine(config.fine, spacing);
-    polish::polish(&mut labelled, spacing, regions);
-    Ok(labelled)
+    regions.levels = best.1;
+    regions.refine(config.fine, found.spacing);
+    found
 }
 
 /// Step length of each level: reduced after each overshoot, which thin labels cause.
@@ -105,8 +131,8 @@ impl Stride {
         Self { gains: vec![1.0; count], missing: vec![0.0; count] }
     }
 
-    fn go(&mut self, levels: &mut [f64], balance: &Balance, spacing: f64) {
-        let steps = balance.steps(spacing);
+    fn go(&mut self, levels: &mut [f64], balance: &Balance, spacing: f64, is_given: bool) {
+        let steps = balance.steps(spacing, is_given);
         for (label, level) in levels.iter_mut().enumerate() {
             let missing = balance.missing[label];
             let overshot = missing * self.missing[label] < 0.0;
@@ -162,7 +188,7 @@ struct Balance {
 
 impl Balance {
     fn of(labelled: &LabelledMesh, regions: &Regions) -> Self {
-        let LabelledMesh { mesh, label_of_tet } = labelled;
+        let LabelledMesh { mesh, label_of_tet, .. } = labelled;
         let count = regions.names.len();
         let mut missing = regions.mm3.clone();
         let mut areas = vec![0.0; count * count];
@@ -199,14 +225,14 @@ impl Balance {
         worst.max(each / (ALL_TOLERANCE * all)).max(self.missing[0].abs() / (VOLUME_TOLERANCE * all))
     }
 
-    /// Correction of each level, mm.
-    fn steps(&self, spacing: f64) -> Vec<f64> {
+    /// Correction of each level, mm; none of the first if the outer surface is given.
+    fn steps(&self, spacing: f64, is_given: bool) -> Vec<f64> {
         let count = self.missing.len();
         let most = 0.3 * spacing;
         let row = |own: usize| &self.areas[own * count..(own + 1) * count];
         let outer: f64 = (1..count).map(|own| row(own)[0]).sum();
         let mut steps = vec![0.0; count];
-        steps[0] = (self.missing[0] / outer).clamp(-most, most);
+        steps[0] = if is_given { 0.0 } else { (self.missing[0] / outer).clamp(-most, most) };
         for _ in 0..SWEEPS {
             for own in 1..count {
                 let others = row(own).iter().zip(&steps).skip(1);

@@ -6,7 +6,14 @@
 //! A cut point nearer to a node than α times the edge *violates* it; the node is moved to that
 //! point, counts as on the boundary of every label from then on, and its other cut points are
 //! removed. No remaining cut is then close to a node. Each remaining tetrahedron is divided at its
-//! cuts, identically on both sides of a boundary (∘ is a node on a boundary):
+//! cuts, identically on both sides of a boundary (∘ is a node on a boundary).
+//!
+//! The outer surface comes first: cuts with the outside move nodes as if there were one label.
+//! Then a node with a cut left with the outside counts as on the boundary of its labels where it
+//! is, and other nodes are moved to boundaries between labels; both remain inside for the outer
+//! surface. So a tetrahedron with a node outside is cut as with one label, and the outer surface
+//! does not depend on labels inside. Where one reaches it, that label's border is accurate to half
+//! a spacing.
 //!
 //! ```text
 //! A A A A, A ∘ ∘ ∘   whole            A A A B    a prism, three, and a corner
@@ -39,7 +46,7 @@ use super::LabelledMesh;
 use super::octree::Lattice;
 use super::regions::Partition;
 use crate::TetMesh;
-use crate::quality::{EDGES, volume};
+use crate::quality::{EDGES, dihedrals_deg, volume};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -53,8 +60,13 @@ const HALVINGS: usize = 24;
 /// Smallest volume that warping may leave a lattice tetrahedron, in cubes of the finest spacing; at
 /// rest the smallest has 1/12.
 const LEAST_VOLUME: f64 = 1e-4;
-/// The label of a node on a boundary.
+/// Dihedral angles that cutting leaves on cubes of one size, degrees.
+const LEAST_DEG: f64 = 9.3;
+const MOST_DEG: f64 = 161.7;
+/// The label of a node on the outer surface.
 pub(super) const ON: u16 = u16::MAX;
+/// The label of a node on a boundary between labels inside.
+pub(super) const INNER: u16 = u16::MAX - 1;
 
 /// The labelled lattice during warping and cutting.
 pub(super) struct Stuffing<'a, P> {
@@ -109,21 +121,47 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         Self { lattice, regions, positions, labels, outside, edges, cuts, tets }
     }
 
-    /// Moves each violated node to its nearest violating cut point.
+    /// Moves each violated node to its nearest violating cut point: first to the outer surface.
     fn warp(&mut self) {
         let ends = (0..2 * self.edges.len()).map(|n| (self.edges[n / 2][n % 2], (n / 2) as u32));
         let cuts_of_node = crate::Csr::of_pairs(self.positions.len(), ends);
         let corners = self.tets.iter().enumerate().flat_map(|(t, tet)| tet.iter().map(move |&n| (n, t as u32)));
         let tets_of_node = crate::Csr::of_pairs(self.positions.len(), corners);
         let reach = self.reach();
-        for node in 0..self.positions.len() {
-            if let Some(cut) = self.violation(node, reach[node], cuts_of_node.row(node))
-                && !self.flattens(node, cut, tets_of_node.row(node))
-            {
-                self.positions[node] = cut;
-                self.labels[node] = ON;
+        for to in [ON, INNER] {
+            for node in 0..self.positions.len() {
+                if let Some(cut) = self.violation(node, reach[node], to, cuts_of_node.row(node))
+                    && !self.flattens(node, cut, tets_of_node.row(node))
+                {
+                    if to == ON || !self.sharpens(node, cut, tets_of_node.row(node)) {
+                        self.positions[node] = cut;
+                    }
+                    self.labels[node] = to;
+                }
+            }
+            if to == ON {
+                self.hold_rim();
             }
         }
+    }
+
+    /// Counts each node that has cuts with the outside and with another label as on the boundary
+    /// inside, where it is.
+    fn hold_rim(&mut self) {
+        let mut rim = vec![false; self.positions.len()];
+        for &[a, b] in self.edges.iter().filter(|&&edge| self.alive(edge, ON)) {
+            [a, b].into_iter().for_each(|n| rim[n as usize] = true);
+        }
+        let inner: Vec<[u32; 2]> = self.edges.iter().copied().filter(|&edge| self.alive(edge, INNER)).collect();
+        for n in inner.into_iter().flatten().filter(|&n| rim[n as usize]) {
+            self.labels[n as usize] = INNER;
+        }
+    }
+
+    /// Whether an edge still has its cut, with the outside if `to` is [`ON`], else between labels.
+    fn alive(&self, edge: [u32; 2], to: u16) -> bool {
+        let labels = edge.map(|n| self.labels[n as usize]);
+        labels.iter().all(|&label| label < INNER) && (labels.contains(&0) == (to == ON))
     }
 
     /// Whether moving a node would leave a tetrahedron at it almost without volume. Only where
@@ -138,6 +176,16 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         };
         let least = LEAST_VOLUME * self.lattice.spacing.powi(3);
         tets.iter().map(left).any(|volume| volume.is_nan() || volume < least)
+    }
+
+    /// Whether moving a node would sharpen a tetrahedron whose other nodes are on boundaries, which
+    /// is not cut.
+    fn sharpens(&self, node: usize, to: DVec3, tets: &[u32]) -> bool {
+        let is_whole = |tet: &[u32; 4]| tet.iter().all(|&n| n as usize == node || self.labels[n as usize] >= INNER);
+        let place = |n: u32| if n as usize == node { to } else { self.positions[n as usize] };
+        let is_sharp = |angle: f64| !(LEAST_DEG..=MOST_DEG).contains(&angle);
+        let whole = tets.iter().map(|&t| self.tets[t as usize]).filter(is_whole);
+        whole.flat_map(|tet| dihedrals_deg(tet.map(place))).any(is_sharp)
     }
 
     /// Spacing of the finest lattice at each node, mm.
@@ -157,13 +205,9 @@ impl<'a, P: Partition> Stuffing<'a, P> {
     }
 
     /// The nearest violating cut of a node whose edge still has labels at both ends.
-    fn violation(&self, node: usize, reach: f64, cuts: &[u32]) -> Option<DVec3> {
-        if self.labels[node] == ON {
-            return None;
-        }
+    fn violation(&self, node: usize, reach: f64, to: u16, cuts: &[u32]) -> Option<DVec3> {
         let here = self.positions[node];
-        let alive =
-            cuts.iter().map(|&c| c as usize).filter(|&c| self.edges[c].iter().all(|&n| self.labels[n as usize] != ON));
+        let alive = cuts.iter().map(|&c| c as usize).filter(|&c| self.alive(self.edges[c], to));
         let near = alive
             .map(|c| (self.cuts[c].distance(here), c))
             .filter(|&(distance, c)| distance < self.limit(self.edges[c]).min(self.limit_at(reach, self.edges[c])));
@@ -191,7 +235,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         }
         let positions = self.positions.iter().chain(&self.cuts).map(|p| p.as_vec3()).collect();
         let mesh = TetMesh { positions, tets: pieces.tets }.without_orphans();
-        LabelledMesh { mesh, label_of_tet: pieces.labels }
+        LabelledMesh { mesh, label_of_tet: pieces.labels, ..LabelledMesh::default() }
     }
 
     /// Position of a node or a cut.
@@ -208,17 +252,24 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         let mut nodes = tet;
         nodes.sort_unstable_by_key(|&n| (self.labels[n as usize], n));
         let label = |n: u32| self.labels[n as usize];
-        let held = nodes.iter().filter(|&&n| label(n) != ON).count();
+        let outer = nodes.iter().filter(|&&n| label(n) == 0).count();
+        if outer > 0 {
+            return self.emit_inside(nodes, outer, out);
+        }
+        let held = nodes.iter().filter(|&&n| label(n) < INNER).count();
         let first = out.tets.len();
         let (held, on) = nodes.split_at(held);
         let mut groups = held.chunk_by(|&a, &b| label(a) == label(b));
         match [groups.next(), groups.next(), groups.next(), groups.next()] {
+            [None, ..] if on.iter().any(|&n| label(n) == INNER) => {
+                out.add(self.regions.inner_at(self.middle(tet)), &[tet]);
+            }
             [None, ..] if tet.iter().any(|&n| self.outside[n as usize]) => {}
             [None, ..] => out.add(self.regions.label_at(self.middle(tet)), &[tet]),
             [Some(a), None, ..] => out.add(label(a[0]), &[tet]),
             [Some(a), Some(b), None, _] => {
-                self.side(a, b, on, out);
-                self.side(b, a, on, out);
+                self.side(label(a[0]), a, b, on, out);
+                self.side(label(b[0]), b, a, on, out);
             }
             [Some(a), Some(b), Some(c), None] => self.three([a, b, c], on, out),
             [Some(_), Some(_), Some(_), Some(_)] => self.four(nodes, out),
@@ -226,9 +277,25 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         out.keep_inside(first);
     }
 
+    /// Adds the pieces inside of a tetrahedron whose first nodes are outside. Those inside have one
+    /// label or are on its boundary, so that the cut is that of one label.
+    fn emit_inside(&self, nodes: [u32; 4], outer: usize, out: &mut Pieces) {
+        let (outer, rest) = nodes.split_at(outer);
+        let on = rest.iter().filter(|&&n| self.labels[n as usize] == ON).count();
+        let (own, on) = rest.split_at(rest.len() - on);
+        let Some(&first) = own.first() else { return };
+        let middle = || own.iter().map(|&n| self.place(n)).sum::<DVec3>() / own.len() as f64;
+        let label = match self.labels[first as usize] {
+            INNER => self.regions.inner_at(middle()),
+            label => label,
+        };
+        let mut own = own.to_vec();
+        own.sort_unstable();
+        self.side(label, &own, outer, on, out);
+    }
+
     /// One label's part of a tetrahedron with two labels.
-    fn side(&self, own: &[u32], other: &[u32], on: &[u32], out: &mut Pieces) {
-        let label = self.labels[own[0] as usize];
+    fn side(&self, label: u16, own: &[u32], other: &[u32], on: &[u32], out: &mut Pieces) {
         match (own, other) {
             (&[p], _) => out.add(label, &[self.corner(p, other, on)]),
             (&[p, q], &[n]) => out.add(label, &self.pyramid(on[0], [p, q], n)),

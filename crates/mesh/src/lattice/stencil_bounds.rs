@@ -19,6 +19,10 @@ impl<F: Fn(DVec3) -> f64 + Sync> Partition for By<F> {
     fn label_at(&self, p: DVec3) -> u16 {
         u16::from((self.0)(p) > 0.0)
     }
+
+    fn inner_at(&self, _: DVec3) -> u16 {
+        1
+    }
 }
 
 /// Labels with random values at each cell of a fine hash.
@@ -50,6 +54,54 @@ impl Partition for Noise {
     fn label_at(&self, p: DVec3) -> u16 {
         let all: Vec<u16> = (0..self.labels).collect();
         self.strongest(&all, p)
+    }
+
+    fn inner_at(&self, p: DVec3) -> u16 {
+        let all: Vec<u16> = (1..self.labels).collect();
+        self.strongest(&all, p)
+    }
+}
+
+/// A body defined by a function, divided by noise.
+struct Divided<F>(F, Noise);
+
+impl<F: Fn(DVec3) -> f64 + Sync> Partition for Divided<F> {
+    fn lead(&self, label: u16, other: u16, p: DVec3) -> f64 {
+        match (label, other) {
+            (0, _) => -(self.0)(p),
+            (_, 0) => (self.0)(p),
+            _ => self.1.lead(label, other, p),
+        }
+    }
+
+    fn label_at(&self, p: DVec3) -> u16 {
+        if (self.0)(p) > 0.0 { self.inner_at(p) } else { 0 }
+    }
+
+    fn inner_at(&self, p: DVec3) -> u16 {
+        self.1.inner_at(p)
+    }
+}
+
+/// The corners of the surface's triangles, in order.
+fn surface_of(mesh: &crate::TetMesh) -> Vec<[[u32; 3]; 3]> {
+    let corner = |n: u32| mesh.positions[n as usize].to_array().map(f32::to_bits);
+    let mut all: Vec<_> = Surface::of(mesh).triangles.iter().map(|triangle| triangle.map(corner)).collect();
+    all.iter_mut().for_each(|triangle| triangle.sort_unstable());
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn labels_inside_leave_every_triangle_of_the_outer_surface_as_it_is() {
+    let waves = |p: DVec3| 7.0 + 1.5 * (1.3 * p.x).sin() * (1.1 * p.y).cos() - p.distance(DVec3::splat(10.0));
+    for (seed, lattice) in [uniform(20.0, 1.7), uniform(20.0, 0.9), graded()].into_iter().enumerate() {
+        let plain = stuff(&lattice, &By(waves)).mesh;
+        let divided = stuff(&lattice, &Divided(waves, Noise { seed: seed as u64, labels: 5 }));
+        assert_eq!(surface_of(&divided.mesh), surface_of(&plain));
+        assert!((divided.mesh.total_mm3() / plain.total_mm3() - 1.0).abs() < 1e-6);
+        assert_eq!(Topology::of(&divided.mesh).crowded_face, None);
+        assert!(Quality::of(&divided.mesh).min_mm3 > 0.0);
     }
 }
 

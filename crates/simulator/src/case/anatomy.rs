@@ -2,10 +2,11 @@
 
 use crate::case::{Brain, Inputs};
 use crate::error::SessionError;
+use crate::mixture;
 use crate::recipe::Recipe;
 use glam::DAffine3;
 use std::path::Path;
-use trepan_mesh::lattice::{self, Fine, LabelledMesh};
+use trepan_mesh::lattice::{self, Fine};
 use trepan_volume::{
     AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, Islands, MaskError, ReadError,
     RegistrationConfig, VoxelVolume, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register,
@@ -207,12 +208,12 @@ pub(super) fn make_brain(
     room_for("tetrahedra", recipe.tets as u64, TET_BYTES)
         .map_err(|fault| SessionError::Usage(format!("--tets {}: {fault}; give fewer", recipe.tets)))?;
     let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
-    let config = lattice::Config { target_tets: recipe.tets, fine, ..lattice::Config::default() };
-    let LabelledMesh { mesh, label_of_tet } = lattice::labelled(&classes.map(u16::from), &config)
+    let config = lattice::Config::with_opening(recipe.tets, fine);
+    let labelled = lattice::labelled(&classes.map(u16::from), &config)
         .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
-    mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
-    let class_of_tet = label_of_tet.into_iter().map(|label| label as u8).collect();
-    Ok(Brain { classes, mri, mesh, class_of_tet })
+    labelled.mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
+    let (class_of_tet, mixtures) = mixture::codes(&labelled);
+    Ok(Brain { classes, mri, mesh: labelled.mesh, class_of_tet, mixtures })
 }
 
 /// Resamples the mask to cubic voxels of 0.8 to 1.5 mm and crops it to its content with a margin.

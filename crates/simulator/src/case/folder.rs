@@ -18,6 +18,7 @@ use crate::case::identity::Identity;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
+use crate::mixture::Shares;
 use crate::progress::DraftSkull;
 use crate::recipe::Recipe;
 use glam::{DAffine3, DVec3};
@@ -30,7 +31,7 @@ use trepan_mesh::{lattice::LabelledMesh, vtk};
 use trepan_volume::{VoxelVolume, hounsfield, nifti, read_regular};
 
 /// Version of the folder's format.
-const FORM: u32 = 6;
+const FORM: u32 = 7;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
 const MASK: &str = "mask.nii";
@@ -51,6 +52,8 @@ struct Card {
     isovalue_hu: i16,
     opening: Option<Opening>,
     recipe: Option<Recipe>,
+    /// Shares of the tissue classes in each mixture of the mesh.
+    mixtures: Vec<Shares>,
     notes: Vec<String>,
     /// Each file and its SHA-256.
     files: BTreeMap<String, String>,
@@ -67,7 +70,7 @@ pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
         nifti::write(&folder.join(MASK), &brain.classes)?;
         nifti::write(&folder.join(MRI), &brain.mri)?;
         let label_of_tet = brain.class_of_tet.iter().map(|&class| class.into()).collect();
-        let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet };
+        let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet, ..LabelledMesh::default() };
         vtk::write_labelled(&folder.join(MESH), &labelled)?;
         names.extend([MASK, MRI, MESH]);
     }
@@ -85,6 +88,7 @@ pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
         isovalue_hu: case.isovalue_hu,
         opening: case.opening,
         recipe: case.recipe,
+        mixtures: case.brain.as_ref().map(|brain| brain.mixtures.clone()).unwrap_or_default(),
         notes: case.notes.clone(),
         files: names.into_iter().map(hashed).collect::<io::Result<_>>()?,
     };
@@ -163,7 +167,13 @@ pub(crate) fn load(folder: &Path) -> Result<Case, SessionError> {
             let classes = volume(MASK)?.map(|v| v as u8);
             let labelled = vtk::read_labelled(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?;
             let class_of_tet = labelled.label_of_tet.iter().map(|&label| label as u8).collect();
-            Some(Brain { classes, mri: volume(MRI)?, mesh: labelled.mesh, class_of_tet })
+            Some(Brain {
+                classes,
+                mri: volume(MRI)?,
+                mesh: labelled.mesh,
+                class_of_tet,
+                mixtures: card.mixtures.clone(),
+            })
         }
         false => None,
     };

@@ -15,6 +15,7 @@ mod space;
 mod stages;
 
 use crate::case::opening::Opening;
+use crate::mixture::Shares;
 use crate::recipe::Recipe;
 use crate::tissue_class::TissueSource;
 use std::collections::BTreeMap;
@@ -71,6 +72,8 @@ pub struct Brain {
     pub mri: VoxelVolume<f32>,
     /// Tetrahedra.
     pub mesh: TetMesh,
-    /// Class code of each tetrahedron.
+    /// Class code of each tetrahedron, or a larger code for a mixture.
     pub class_of_tet: Vec<u8>,
+    /// Shares of the classes in each mixture.
+    pub mixtures: Vec<Shares>,
 }

@@ -3,6 +3,7 @@
 use crate::case::opening::bare_brain;
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
+use crate::mixture::{self, Shares};
 use crate::program::Program;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, IVec3};
@@ -11,6 +12,7 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
+use trepan_soft::{Anchor, Body, Material};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.
@@ -41,8 +43,10 @@ pub struct Scene {
 pub struct RestBrain {
     /// Tetrahedra.
     pub mesh: TetMesh,
-    /// Class code of each tetrahedron.
+    /// Class code of each tetrahedron, or a larger code for a mixture.
     pub class_of_tet: Vec<u8>,
+    /// Shares of the classes in each mixture.
+    pub(crate) mixtures: Vec<Shares>,
     /// Nodes of its base, which do not move where nothing else holds it.
     pub fixed: Vec<u32>,
     /// Distance to its surface, mm, negative inside.
@@ -87,6 +91,17 @@ impl Scene {
 }
 
 impl RestBrain {
+    /// The body of the brain, of materials by tissue class, in their order.
+    pub fn body(&self, of_classes: Vec<Material>, fixed: Vec<u32>, anchors: Vec<Anchor>) -> Body {
+        Body {
+            mesh: self.mesh.clone(),
+            fixed,
+            anchors,
+            materials: mixture::materials(of_classes, &self.mixtures),
+            material_of_tet: self.class_of_tet.iter().map(|code| code - 1).collect(),
+        }
+    }
+
     /// Distance to the tissue of some classes, mm: exact up to 9 mm, at least 9 mm beyond. `None`
     /// without such tissue.
     pub fn distance_to(&self, classes: &[TissueClass]) -> Option<DistanceField> {
@@ -122,8 +137,8 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
     let tint: Vec<[u8; 3]> = brain.classes.data.iter().map(tint_of).collect();
     let tint = Some(tint).filter(|tint| tint.iter().any(|&colour| colour != [0; 3]));
     let field = Arc::new(DistanceField::of_mask(&brain.classes));
-    let Brain { classes, mri, mesh, class_of_tet } = brain;
-    RestBrain { fixed, field, mesh, class_of_tet, classes, mri, tint }
+    let Brain { classes, mri, mesh, class_of_tet, mixtures } = brain;
+    RestBrain { fixed, field, mesh, class_of_tet, mixtures, classes, mri, tint }
 }
 
 /// Surface nodes of the lower brain near bone.

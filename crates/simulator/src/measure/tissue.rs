@@ -217,7 +217,7 @@ impl<'a> Brains<'a> {
 }
 
 fn meshed(domain: &lattice::Domain, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, SessionError> {
-    let config = lattice::Config { target_tets, fine, ..lattice::Config::default() };
+    let config = lattice::Config::with_opening(target_tets, fine);
     domain.labelled(&config).map(|labelled| labelled.mesh).map_err(brain_error)
 }
 

@@ -91,7 +91,8 @@ mod tests {
         mesh.positions.iter_mut().for_each(|p| *p -= 9.0);
         let field = Arc::new(DistanceField::of_mask(&classes));
         let mri = classes.map(f32::from);
-        let brain = RestBrain { mesh, class_of_tet: vec![], fixed: vec![], field, classes, mri, tint: None };
+        let brain =
+            RestBrain { mesh, class_of_tet: vec![], mixtures: vec![], fixed: vec![], field, classes, mri, tint: None };
         let press = |ms: u16, x: f32, z: f32, newton: f32| TickRecord {
             time_ms: f64::from(ms),
             proxy: Pose::from_translation(Vec3::new(x, 0.0, z)),

@@ -41,7 +41,7 @@ fn case() -> Case {
     let mut mesh = boxes::split_box([7, 7, 4], Vec3::new(40.0, 40.0, 25.0));
     mesh.positions.iter_mut().for_each(|p| *p -= Vec3::new(20.0, 20.0, 33.0));
     let class_of_tet = (0..mesh.tets.len()).map(|tet| if tet % 5 == 0 { 3 } else { 1 }).collect();
-    let brain = Brain { mri: classes.map(f32::from), classes, mesh, class_of_tet };
+    let brain = Brain { mri: classes.map(f32::from), classes, mesh, class_of_tet, mixtures: Vec::new() };
     let opening = Opening { entry_mm: [0.0; 3], inward: [0.0, 0.0, -1.0], bone_mm: 6.0, brain_mm: 8.0 };
     Case {
         name: "plate".into(),

@@ -155,7 +155,7 @@ fn distances(scene: &Scene, labelled: &LabelledMesh) -> [f64; 2] {
 
 /// Submesh of some labels.
 fn part(labelled: &LabelledMesh, holds: impl Fn(u16) -> bool) -> TetMesh {
-    let LabelledMesh { mesh, label_of_tet } = labelled;
+    let LabelledMesh { mesh, label_of_tet, .. } = labelled;
     let tets = mesh.tets.iter().zip(label_of_tet).filter(|(_, label)| holds(**label)).map(|(tet, _)| *tet);
     TetMesh { positions: mesh.positions.clone(), tets: tets.collect() }
 }

@@ -62,13 +62,8 @@ pub fn findings() -> Result<Findings> {
 
 /// The brain at rest in a solver.
 fn solver(brain: &RestBrain, material_of_tet: Vec<u8>) -> Result<SolverStage> {
-    let body = Body {
-        mesh: brain.mesh.clone(),
-        fixed: brain.fixed.clone(),
-        materials: TissueClass::ALL.map(|class| class.material(BRAIN_MPA)).to_vec(),
-        material_of_tet,
-        anchors: Vec::new(),
-    };
+    let of_classes = TissueClass::ALL.map(|class| class.material(BRAIN_MPA)).to_vec();
+    let body = Body { material_of_tet, ..brain.body(of_classes, brain.fixed.clone(), Vec::new()) };
     Ok(SolverStage::new(Box::new(trepan_tled::Tled::new(&body, &trepan_tled::Config::default())?)))
 }
 

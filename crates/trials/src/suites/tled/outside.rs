@@ -190,7 +190,7 @@ impl Shape {
     }
 
     fn filled(&self, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh> {
-        Ok(self.domain.labelled(&lattice::Config { target_tets, fine, ..lattice::Config::default() })?.mesh)
+        Ok(self.domain.labelled(&lattice::Config::with_opening(target_tets, fine))?.mesh)
     }
 }
 

@@ -67,13 +67,7 @@ impl Head {
     pub fn at_rest(&self) -> Result<Still> {
         let with = Ingredients::of(Quality::Auto);
         let Held { fixed, anchors, wall } = self.brain.held_in_skull(Arc::clone(&self.bone), &self.plan)?;
-        let body = Body {
-            mesh: self.brain.mesh.clone(),
-            fixed,
-            anchors,
-            materials: with.materials(BRAIN_MPA),
-            material_of_tet: self.brain.class_of_tet.iter().map(|code| code - 1).collect(),
-        };
+        let body = self.brain.body(with.materials(BRAIN_MPA), fixed, anchors);
         Ok(Still {
             wall,
             solver: solver(&body, with.relaxation(), 0.0)?,

@@ -1,0 +1,139 @@
+//! A material for a tetrahedron that holds several.
+//!
+//! # Theory
+//! Of parts with volume shares f and moduli M, equal strain gives Voigt's bound `Σ f M`, equal
+//! stress Reuss's `1 / Σ (f / M)`; the truth lies between. [`Bound::Hill`] is their mean, for shear
+//! and bulk modulus alike. The law is that of the part with most of Voigt's shear modulus. Where it
+//! is the stiffening one, its share and bound are means, weighted by what they act on.
+//!
+//! The bulk modulus is rounded to octaves of a reference's: averaged nodal pressure keeps apart
+//! elements of different bulk moduli ([`Body::bulk_groups`](crate::Body::bulk_groups)), and would
+//! lock again if every tetrahedron had its own. Brain's is a stand-in for that of water in any case.
+//!
+//! # Sources
+//! R. Hill: The elastic behaviour of a crystalline aggregate, Proc. Phys. Soc. A 65, 1952, with
+//! Voigt's (1889) and Reuss's (1929) bounds.
+
+use crate::Material;
+
+/// How the moduli of parts make one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// Equal strain, the stiffest.
+    Voigt,
+    /// Equal stress, the softest.
+    Reuss,
+    /// The mean of both.
+    Hill,
+}
+
+impl Bound {
+    /// One modulus from those of parts, each with its share of the volume.
+    pub fn of(self, parts: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+        let voigt: f64 = parts.clone().map(|(share, modulus)| share * modulus).sum();
+        let reuss = 1.0 / parts.map(|(share, modulus)| share / modulus).sum::<f64>();
+        match self {
+            Self::Voigt => voigt,
+            Self::Reuss => reuss,
+            Self::Hill => 0.5 * (voigt + reuss),
+        }
+    }
+}
+
+impl Material {
+    /// Mixes parts, given by their shares of the volume, which add up to 1; its bulk modulus is that
+    /// of `reference` times a power of 2, and at least 2/3 of its shear modulus. `None` without a
+    /// part.
+    pub fn mixture(parts: &[(f64, Self)], bound: Bound, reference: &Self) -> Option<Self> {
+        let weight = |(share, part): &(f64, Self)| share * part.shear_mpa();
+        let first = parts.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))?.1;
+        let shear = bound.of(parts.iter().map(|(share, part)| (*share, part.shear_mpa())));
+        let bulk = bound.of(parts.iter().map(|(share, part)| (*share, part.bulk_mpa())));
+        let octave = (bulk / reference.bulk_mpa()).log2().round().exp2();
+        let density = parts.iter().map(|(share, part)| share * f64::from(part.density_g_mm3())).sum::<f64>();
+        let mut mixed = first.with_moduli(shear, octave * reference.bulk_mpa(), density);
+        if let Self::Stiffening { share: mixed_share, bound: mixed_bound, .. } = &mut mixed {
+            let (mut all, mut plain, mut stiff, mut bounds) = (0.0, 0.0, 0.0, 0.0);
+            for part in parts {
+                if let Self::Stiffening { share, bound, .. } = part.1 {
+                    let rest = weight(part) * f64::from(1.0 - share);
+                    all += weight(part);
+                    plain += weight(part) * f64::from(share);
+                    (stiff, bounds) = (stiff + rest, bounds + rest * f64::from(bound));
+                }
+            }
+            (*mixed_share, *mixed_bound) = ((plain / all) as f32, (bounds / stiff) as f32);
+        }
+        Some(mixed)
+    }
+
+    /// The same law with other moduli at small strain, MPa, and density, g/mm³.
+    fn with_moduli(self, shear: f64, bulk: f64, density: f64) -> Self {
+        let ratio = (shear / self.shear_mpa()) as f32;
+        let poisson = ((3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))).max(0.0);
+        let young_mpa = (2.0 * shear * (1.0 + poisson)) as f32;
+        let (poisson, density_g_mm3) = (poisson as f32, density as f32);
+        match self {
+            Self::NeoHookean { .. } => Self::NeoHookean { young_mpa, poisson, density_g_mm3 },
+            Self::StVenantKirchhoff { .. } => Self::StVenantKirchhoff { young_mpa, poisson, density_g_mm3 },
+            Self::MooneyRivlin { c10_mpa, c01_mpa, .. } => {
+                Self::MooneyRivlin { c10_mpa: c10_mpa * ratio, c01_mpa: c01_mpa * ratio, poisson, density_g_mm3 }
+            }
+            Self::Ogden { shear_mpa, exponent, .. } => {
+                Self::Ogden { shear_mpa: shear_mpa.map(|mu| mu * ratio), exponent, poisson, density_g_mm3 }
+            }
+            Self::Stiffening { share, bound, .. } => {
+                Self::Stiffening { shear_mpa: shear as f32, share, bound, poisson, density_g_mm3 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [Bound; 3] = [Bound::Voigt, Bound::Reuss, Bound::Hill];
+
+    #[test]
+    fn a_mixture_of_one_is_that_one_and_bounds_are_in_order() {
+        for part in [Material::BRAIN, Material::BRAIN_OGDEN, Material::CORTEX] {
+            let mixed = Material::mixture(&[(1.0, part)], Bound::Hill, &part).unwrap();
+            assert!((mixed.shear_mpa() / part.shear_mpa() - 1.0).abs() < 1e-6, "{mixed:?}");
+            assert!((mixed.bulk_mpa() / part.bulk_mpa() - 1.0).abs() < 1e-5, "{mixed:?}");
+            assert_eq!(mixed.check(), Ok(()));
+        }
+        let parts = [(0.25, 4.0), (0.75, 1.0)];
+        let [voigt, reuss, hill] = ALL.map(|bound| bound.of(parts.into_iter()));
+        assert!((voigt - 1.75).abs() < 1e-12 && (reuss - 16.0 / 13.0).abs() < 1e-12);
+        assert_eq!(hill, 0.5 * (voigt + reuss));
+    }
+
+    #[test]
+    fn mixtures_of_solids_share_a_bulk_modulus_and_fluid_softens_both() {
+        let of = |grey: f64| {
+            let parts = [(grey, Material::CORTEX), (1.0 - grey, Material::CORONA_RADIATA)];
+            Material::mixture(&parts, Bound::Hill, &Material::WHOLE_BRAIN).unwrap()
+        };
+        for grey in [0.05, 0.3, 0.5, 0.9] {
+            let (mixed, brain) = (of(grey), Material::WHOLE_BRAIN);
+            assert_eq!(mixed.check(), Ok(()));
+            assert!((mixed.bulk_mpa() / brain.bulk_mpa() - 1.0).abs() < 1e-4, "{mixed:?}");
+        }
+        let Material::Stiffening { share, bound, .. } = of(0.5) else { panic!("another law") };
+        let [Material::Stiffening { share: a, bound: b, .. }, Material::Stiffening { share: c, bound: d, .. }] =
+            [Material::CORTEX, Material::CORONA_RADIATA]
+        else {
+            panic!("another law")
+        };
+        assert!((a.min(c)..=a.max(c)).contains(&share) && (b.min(d)..=b.max(d)).contains(&bound));
+        for fluid in [0.1, 0.5, 0.9] {
+            let parts = [(1.0 - fluid, Material::WHOLE_BRAIN), (fluid, Material::VENTRICLE)];
+            for bound in ALL {
+                let mixed = Material::mixture(&parts, bound, &Material::WHOLE_BRAIN).unwrap();
+                assert_eq!(mixed.check(), Ok(()), "{fluid} {bound:?}");
+                assert!(mixed.shear_mpa() < Material::WHOLE_BRAIN.shear_mpa());
+            }
+        }
+    }
+}
