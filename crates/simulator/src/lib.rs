@@ -64,6 +64,7 @@ pub use command::command;
 pub use error::SessionError;
 pub use ingredients::{Effect, Element, Ingredients, Law, Relaxation, SolverDevice, Support};
 pub use ingredients::{Variant, of_quality, realistic, variants};
+pub use mixture::body_of;
 pub use options::Options;
 pub use program::{Phase, Program};
 pub use recipe::Recipe;

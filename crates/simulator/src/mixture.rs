@@ -9,7 +9,7 @@
 use crate::tissue_class::TissueClass;
 use std::collections::BTreeMap;
 use trepan_mesh::lattice::LabelledMesh;
-use trepan_soft::{Bound, Material};
+use trepan_soft::{Body, Bound, Material};
 
 /// Shares of a volume by class, in the order of [`TissueClass::ALL`].
 pub(crate) type Shares = [f32; TissueClass::ALL.len()];
@@ -19,8 +19,8 @@ const MOST: usize = 256 - TissueClass::ALL.len();
 /// Steps to which shares are rounded, from fine to coarse; one step leaves at most 2⁹ mixtures, in
 /// truth few.
 const STEPS: [f32; 8] = [32.0, 16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0];
-/// How the moduli of classes make those of a mixture.
-const BOUND: Bound = Bound::Hill;
+/// How the moduli of classes make those of a mixture in a session.
+pub(crate) const BOUND: Bound = Bound::Hill;
 
 /// The code of each tetrahedron of a mesh whose labels are class codes, and the mixtures.
 pub(crate) fn codes(labelled: &LabelledMesh) -> (Vec<u8>, Vec<Shares>) {
@@ -53,12 +53,25 @@ pub(crate) fn codes(labelled: &LabelledMesh) -> (Vec<u8>, Vec<Shares>) {
     (codes, mixtures)
 }
 
+/// A body of a mesh whose labels are class codes, made of materials by class in their order and of
+/// mixtures by a bound.
+pub fn body_of(labelled: &LabelledMesh, of_classes: Vec<Material>, bound: Bound, fixed: Vec<u32>) -> Body {
+    let (codes, mixtures) = codes(labelled);
+    Body {
+        mesh: labelled.mesh.clone(),
+        fixed,
+        materials: materials(of_classes, &mixtures, bound),
+        material_of_tet: codes.into_iter().map(|code| code - 1).collect(),
+        anchors: Vec::new(),
+    }
+}
+
 /// The materials of the classes, then those of the mixtures.
-pub(crate) fn materials(mut of_classes: Vec<Material>, mixtures: &[Shares]) -> Vec<Material> {
+pub(crate) fn materials(mut of_classes: Vec<Material>, mixtures: &[Shares], bound: Bound) -> Vec<Material> {
     for shares in mixtures {
         let parts = shares.iter().zip(&of_classes).filter(|(share, _)| **share > 0.0);
         let parts: Vec<(f64, Material)> = parts.map(|(share, material)| (f64::from(*share), *material)).collect();
-        let mixed = Material::mixture(&parts, BOUND, &of_classes[TissueClass::Brain as usize]);
+        let mixed = Material::mixture(&parts, bound, &of_classes[TissueClass::Brain as usize]);
         of_classes.push(mixed.unwrap_or(of_classes[TissueClass::Brain as usize]));
     }
     of_classes
@@ -101,7 +114,7 @@ mod tests {
         }
         assert!(codes.iter().enumerate().all(|(tet, code)| (*code == 1) == (tet % 2 == 1)));
         let plain = TissueClass::ALL.map(|class| class.stiffening(0.003)).to_vec();
-        let all = materials(plain.clone(), &mixtures);
+        let all = materials(plain.clone(), &mixtures, BOUND);
         assert_eq!((all.len(), &all[..9]), (9 + mixtures.len(), &plain[..]));
         all.iter().for_each(|material| assert_eq!(material.check(), Ok(())));
     }

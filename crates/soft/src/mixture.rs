@@ -8,7 +8,7 @@
 //!
 //! The bulk modulus is rounded to octaves of a reference's: averaged nodal pressure keeps apart
 //! elements of different bulk moduli ([`Body::bulk_groups`](crate::Body::bulk_groups)), and would
-//! lock again if every tetrahedron had its own. Brain's is a stand-in for that of water in any case.
+//! lock again if every tetrahedron had its own. Brain's is a stand-in for that of water anyway.
 //!
 //! # Sources
 //! R. Hill: The elastic behaviour of a crystalline aggregate, Proc. Phys. Soc. A 65, 1952, with
@@ -41,9 +41,10 @@ impl Bound {
 }
 
 impl Material {
-    /// Mixes parts, given by their shares of the volume, which add up to 1; its bulk modulus is that
-    /// of `reference` times a power of 2, and at least 2/3 of its shear modulus. `None` without a
-    /// part.
+    /// Mixes parts, given by their shares of the volume, which add up to 1.
+    ///
+    /// The bulk modulus is that of `reference` times a power of 2, and at least 2/3 of the shear
+    /// modulus. `None` without a part.
     pub fn mixture(parts: &[(f64, Self)], bound: Bound, reference: &Self) -> Option<Self> {
         let weight = |(share, part): &(f64, Self)| share * part.shear_mpa();
         let first = parts.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))?.1;

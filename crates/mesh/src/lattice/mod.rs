@@ -59,7 +59,7 @@ pub struct Config {
     /// Region with a finer boundary.
     pub fine: Option<Fine>,
     /// Least thickness of a label with borders of its own, in spacings of the cubes there, 0 or
-    /// more; a layer at the outer surface needs half. Thinner ones become shares of tetrahedra, all
+    /// more. A layer at the outer surface needs half. Thinner ones become shares of tetrahedra, all
     /// of them at infinity. Under 1.5 borders may be ragged and labels lost.
     pub least_thickness: f64,
 }
@@ -321,7 +321,7 @@ mod tests {
             assert_eq!(mixed.mesh, plain);
             let some = labelled(&labels, &with(2.0)).unwrap();
             assert!(some.mesh.tets.len().abs_diff(target_tets) * 10 <= target_tets);
-            // As cut they are the same bits (`stencil_bounds`); then nodes move for the height of elements.
+            // As cut they are the same bits (`stencil_bounds`); then nodes move for their elements.
             let [of_plain, of_some] = [&plain, &some.mesh].map(|mesh| (Surface::of(mesh), mesh));
             assert_eq!(of_some.0.triangles.len(), of_plain.0.triangles.len());
             let [area, of_some] = [of_plain, of_some].map(|(surface, mesh)| surface.area_mm2(&mesh.positions));

@@ -59,8 +59,8 @@ pub(super) struct Regions {
     fine: Option<(Fine, f64)>,
 }
 
-/// Distance from a finer region over the edge of the cubes there, beyond the finest: cubes of one
-/// size are two deep, and begin where their corners leave the region.
+/// Distance from a finer region over the edge of the cubes there, where it is over the finest.
+/// Cubes of one size are two deep, and begin where their corners leave the region.
 pub(super) const GROWTH: f64 = 3.0;
 
 impl Regions {

@@ -97,7 +97,7 @@ impl RestBrain {
             mesh: self.mesh.clone(),
             fixed,
             anchors,
-            materials: mixture::materials(of_classes, &self.mixtures),
+            materials: mixture::materials(of_classes, &self.mixtures, mixture::BOUND),
             material_of_tet: self.class_of_tet.iter().map(|code| code - 1).collect(),
         }
     }

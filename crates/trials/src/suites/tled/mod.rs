@@ -1,5 +1,6 @@
 //! Soft-tissue solvers: how right each is and what that costs, and where each fails.
 
+mod classes;
 pub(super) mod closed_forms;
 mod device;
 mod fronts;
@@ -24,6 +25,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.extend(motion::parts());
     parts.extend([Part::new("region", region::run), Part::new("device", device::run)]);
     parts.extend(outside::parts());
+    parts.push(Part::new("tissue classes", classes::run));
     parts.extend(slender::parts());
     parts.extend(speed::parts());
     parts.extend(stability::parts());
@@ -34,6 +36,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
 /// The charts, maps and tables of what was found.
 pub fn judge(_: Scope, findings: &mut Findings) {
     locking::draw(findings);
+    classes::draw(findings);
     stability::draw(findings);
     findings.tables.extend(published::tables(&findings.rows));
 }
