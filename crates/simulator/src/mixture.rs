@@ -3,8 +3,8 @@
 //! # Practice
 //! A tetrahedron's code is that of its class, or a larger one for a mixture. So a code minus one is
 //! the number of a material: the classes' first, then the mixtures'. A solver knows at most 256, so
-//! shares are rounded to the finest steps that leave no more; a mixture has its tetrahedra's mean
-//! shares, and each class keeps its volume.
+//! shares are rounded up to the finest steps that leave no more; a mixture has its tetrahedra's
+//! mean shares, and each class keeps its volume.
 
 use crate::tissue_class::TissueClass;
 use std::collections::BTreeMap;
@@ -16,9 +16,9 @@ pub(crate) type Shares = [f32; TissueClass::ALL.len()];
 
 /// Most mixtures beside the classes.
 const MOST: usize = 256 - TissueClass::ALL.len();
-/// Steps to which shares are rounded, from fine to coarse; one step leaves at most 2⁹ mixtures, in
-/// truth few.
-const STEPS: [f32; 8] = [32.0, 16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0];
+/// Steps to which shares are rounded, from fine to coarse. If even one leaves too many mixtures,
+/// all tetrahedra have the mean of all.
+const STEPS: [f32; 9] = [32.0, 16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0];
 /// How the moduli of classes make those of a mixture in a session.
 pub(crate) const BOUND: Bound = Bound::Hill;
 
@@ -34,11 +34,13 @@ pub(crate) fn codes(labelled: &LabelledMesh) -> (Vec<u8>, Vec<Shares>) {
     let rounded = |steps: f32| {
         let mut bins: BTreeMap<[u8; TissueClass::ALL.len()], Vec<usize>> = BTreeMap::new();
         for (at, (_, shares)) in of_tets.iter().enumerate() {
-            bins.entry(shares.map(|share| (share * steps).round() as u8)).or_default().push(at);
+            // Up: a trace of fluid softens a mean by stress, so none at all is a step of its own.
+            bins.entry(shares.map(|share| (share * steps).ceil() as u8)).or_default().push(at);
         }
         bins
     };
-    let bins = STEPS.into_iter().map(rounded).find(|bins| bins.len() <= MOST).unwrap_or_default();
+    let one = || BTreeMap::from([(Default::default(), (0..of_tets.len()).collect())]);
+    let bins = STEPS.into_iter().map(rounded).find(|bins| bins.len() <= MOST).unwrap_or_else(one);
     let mut mixtures = Vec::new();
     for members in bins.into_values() {
         let mut sum = [0.0f64; TissueClass::ALL.len()];

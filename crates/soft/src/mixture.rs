@@ -6,9 +6,9 @@
 //! and bulk modulus alike. The law is that of the part with most of Voigt's shear modulus. Where it
 //! is the stiffening one, its share and bound are means, weighted by what they act on.
 //!
-//! The bulk modulus is rounded to octaves of a reference's: averaged nodal pressure keeps apart
-//! elements of different bulk moduli ([`Body::bulk_groups`](crate::Body::bulk_groups)), and would
-//! lock again if every tetrahedron had its own. Brain's is a stand-in for that of water anyway.
+//! The bulk modulus is rounded to a power of 4 times a reference's: averaged nodal pressure keeps
+//! apart elements of different bulk moduli ([`Body::bulk_groups`](crate::Body::bulk_groups)), and
+//! would lock again if every tetrahedron had its own. Brain's stands for that of water anyway.
 //!
 //! # Sources
 //! R. Hill: The elastic behaviour of a crystalline aggregate, Proc. Phys. Soc. A 65, 1952, with
@@ -43,16 +43,16 @@ impl Bound {
 impl Material {
     /// Mixes parts, given by their shares of the volume, which add up to 1.
     ///
-    /// The bulk modulus is that of `reference` times a power of 2, and at least 2/3 of the shear
+    /// The bulk modulus is that of `reference` times a power of 4, and at least 2/3 of the shear
     /// modulus. `None` without a part.
     pub fn mixture(parts: &[(f64, Self)], bound: Bound, reference: &Self) -> Option<Self> {
         let weight = |(share, part): &(f64, Self)| share * part.shear_mpa();
         let first = parts.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))?.1;
         let shear = bound.of(parts.iter().map(|(share, part)| (*share, part.shear_mpa())));
         let bulk = bound.of(parts.iter().map(|(share, part)| (*share, part.bulk_mpa())));
-        let octave = (bulk / reference.bulk_mpa()).log2().round().exp2();
+        let rounded = (0.5 * (bulk / reference.bulk_mpa()).log2()).round().exp2().powi(2);
         let density = parts.iter().map(|(share, part)| share * f64::from(part.density_g_mm3())).sum::<f64>();
-        let mut mixed = first.with_moduli(shear, octave * reference.bulk_mpa(), density);
+        let mut mixed = first.with_moduli(shear, rounded * reference.bulk_mpa(), density);
         if let Self::Stiffening { share: mixed_share, bound: mixed_bound, .. } = &mut mixed {
             let (mut all, mut plain, mut stiff, mut bounds) = (0.0, 0.0, 0.0, 0.0);
             for part in parts {

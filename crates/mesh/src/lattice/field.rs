@@ -20,8 +20,9 @@ const STEPS: f64 = 0.75;
 /// The box of a label in its volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Block {
-    low: [usize; 3],
-    high: [usize; 3],
+    /// First voxel and last.
+    pub(super) low: [usize; 3],
+    pub(super) high: [usize; 3],
     /// Number of voxels with the label.
     pub(super) voxels: usize,
 }
@@ -47,29 +48,6 @@ impl Block {
             high: std::array::from_fn(|d| self.high[d].max(other.high[d])),
             voxels: self.voxels + other.voxels,
         }
-    }
-
-    /// First and last voxel of the part within a ball (all of it without one), with a margin;
-    /// `None` if they lie apart.
-    pub(super) fn near<T: Copy>(
-        &self,
-        labels: &VoxelVolume<T>,
-        ball: Option<(DVec3, f64)>,
-        margin_mm: f64,
-    ) -> Option<([usize; 3], [usize; 3])> {
-        let voxel_from_world = labels.world_from_voxel.inverse();
-        let rows = voxel_from_world.matrix3.transpose();
-        let reach = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
-        let (low, high) = (self.low.map(|n| n as f64), self.high.map(|n| n as f64));
-        let (mut low, mut high) = (DVec3::from_array(low), DVec3::from_array(high));
-        if let Some((centre, radius)) = ball {
-            let centre = voxel_from_world.transform_point3(centre);
-            (low, high) = (low.max(centre - radius * reach), high.min(centre + radius * reach));
-        }
-        let last = DVec3::from_array(labels.dims.map(|n| (n - 1) as f64));
-        let (from, to) = ((low - margin_mm * reach).floor(), (high + margin_mm * reach).ceil());
-        let whole = |p: DVec3| p.clamp(DVec3::ZERO, last).to_array().map(|n| n as usize);
-        low.cmple(high).all().then(|| (whole(from), whole(to)))
     }
 
     /// World box of the corners of its voxels.

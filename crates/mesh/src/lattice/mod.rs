@@ -40,6 +40,8 @@ mod thick;
 use crate::materials::{self, Share};
 use crate::{MeshError, TetMesh};
 use regions::Regions;
+use std::sync::OnceLock;
+use thick::Thickness;
 use trepan_geometry::Vec3;
 use trepan_volume::VoxelVolume;
 
@@ -122,6 +124,8 @@ pub fn labelled(labels: &VoxelVolume<u16>, config: &Config) -> Result<LabelledMe
 pub struct Domain {
     labels: VoxelVolume<u16>,
     whole: Regions,
+    /// Made when a mesh first needs it.
+    thickness: OnceLock<Thickness>,
 }
 
 /// Most times that the outer surface is searched anew because labels add too many tetrahedra.
@@ -136,7 +140,7 @@ impl Domain {
         check_config(coarsest)?;
         let most_mm = |mm3| coarsest.smoothing * search::uniform_spacing(mm3, coarsest.target_tets);
         let labels = regions::largest_part(labels)?;
-        Ok(Self { whole: Regions::whole(&labels, most_mm), labels })
+        Ok(Self { whole: Regions::whole(&labels, most_mm), labels, thickness: OnceLock::new() })
     }
 
     /// Fills the labels with tetrahedra, as the function [`labelled`].
@@ -153,7 +157,14 @@ impl Domain {
             let spacing = search::first_spacing(&whole, &aim);
             whole.smooth(aim.smoothing * spacing);
             let found = search::search(&mut whole, &aim, spacing)?;
-            let borders = thick::resolved(&self.labels, &aim, found.spacing);
+            let borders = match aim.least_thickness {
+                0.0 => self.labels.clone(),
+                _ => self.thickness.get_or_init(|| Thickness::of(&self.labels)).borders(
+                    &self.labels,
+                    &aim,
+                    found.spacing,
+                ),
+            };
             let mut divided = whole.divided(&borders, aim.smoothing * spacing);
             let has_one = divided.names.len() == 2;
             let found = if has_one { found } else { search::divide(&mut divided, &aim, &found) };

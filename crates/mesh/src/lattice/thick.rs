@@ -19,26 +19,95 @@ use super::regions::GROWTH;
 use glam::{DAffine3, DVec3};
 use trepan_volume::{DistanceField, VoxelVolume};
 
-/// A distance of the finer region's surface, mm, from which to which balls have one radius.
+/// Distances in a label volume from each label but the most frequent to other labels.
+pub(super) struct Thickness {
+    host: u16,
+    /// First voxel of the box that holds all labels, and the labels there.
+    low: [usize; 3],
+    here: VoxelVolume<u16>,
+    /// By label, mm.
+    to_others: Vec<(u16, Vec<f32>)>,
+}
+
+/// Where balls have one radius: from one distance to another from the finer region, mm.
 struct Scale {
     from_mm: f64,
     to_mm: f64,
     radius_mm: f64,
 }
 
-/// Labels with borders of their own on a lattice of `spacing` mm, and the host in place of others.
-pub(super) fn resolved(labels: &VoxelVolume<u16>, config: &Config, spacing: f64) -> VoxelVolume<u16> {
-    let blocks = Block::of_each(labels);
-    let host =
-        blocks.iter().max_by_key(|(label, block)| (block.voxels, u16::MAX - label)).map_or(0, |(label, _)| *label);
-    if config.least_thickness == 0.0 {
-        return labels.clone();
+impl Thickness {
+    pub(super) fn of(labels: &VoxelVolume<u16>) -> Self {
+        let blocks = Block::of_each(labels);
+        let most = |(label, block): &&(u16, Block)| (block.voxels, u16::MAX - label);
+        let host = blocks.iter().max_by_key(most).map_or(0, |(label, _)| *label);
+        let whole = blocks.iter().fold(blocks[0].1, |whole, (_, block)| whole.with(block));
+        let here = cropped(labels, whole.low, whole.high);
+        let distance = |(label, _): &(u16, Block)| {
+            let others = here.map(|found| u8::from(found != 0 && found != *label));
+            (*label, DistanceField::of_mask(&others).values().data.clone())
+        };
+        let to_others = blocks.iter().filter(|(label, _)| *label != host).map(distance).collect();
+        Self { host, low: whole.low, here, to_others }
     }
-    let mut regions = labels.map(|label| if label == 0 { 0 } else { host });
-    for (label, block) in blocks.iter().filter(|(label, _)| *label != host) {
-        scales(config, spacing).iter().for_each(|scale| add_core(labels, (*label, block), config, scale, &mut regions));
+
+    /// Labels with borders of their own on a lattice of `spacing` mm, and the host in place of
+    /// others.
+    pub(super) fn borders(&self, labels: &VoxelVolume<u16>, config: &Config, spacing: f64) -> VoxelVolume<u16> {
+        let mut borders = labels.map(|label| if label == 0 { 0 } else { self.host });
+        for (label, to_others) in &self.to_others {
+            for scale in scales(config, spacing) {
+                self.add_core((*label, to_others), config, &scale, &mut borders);
+            }
+        }
+        borders
     }
-    regions
+
+    /// Adds the core of one label at one scale.
+    fn add_core(
+        &self,
+        (label, to_others): (u16, &[f32]),
+        config: &Config,
+        scale: &Scale,
+        borders: &mut VoxelVolume<u16>,
+    ) {
+        let spacing_mm = self.here.spacing_mm();
+        let away = |place: DVec3| {
+            config.fine.map_or(0.0, |fine| place.distance(fine.centre.as_dvec3()) - f64::from(fine.radius_mm))
+        };
+        let is_centre = |at: &usize| self.here.data[*at] == label && f64::from(to_others[*at]) >= scale.radius_mm;
+        let voxel = |dims: [usize; 3], at: usize| [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
+        // Balls that reach into the scale's region.
+        let reaches = |at: &[usize; 3]| away(self.here.centre_of(*at)) <= scale.to_mm + scale.radius_mm;
+        let centres = (0..self.here.data.len()).filter(is_centre).map(|at| voxel(self.here.dims, at)).filter(reaches);
+        let bounds = centres.fold(None, |bounds: Option<[[usize; 3]; 2]>, at| {
+            let [low, high] = bounds.unwrap_or([at; 2]);
+            Some([[0, 1, 2].map(|d| low[d].min(at[d])), [0, 1, 2].map(|d| high[d].max(at[d]))])
+        });
+        let Some([low, high]) = bounds else { return };
+        // A ball of voxels is rounder than a ball by half of one.
+        let reach_mm = scale.radius_mm + 0.5 * spacing_mm.length();
+        let reach = (reach_mm / spacing_mm).ceil().to_array().map(|n| n as usize + 1);
+        let low = [0, 1, 2].map(|d| low[d].saturating_sub(reach[d]));
+        let high = [0, 1, 2].map(|d| (high[d] + reach[d]).min(self.here.dims[d] - 1));
+        let part = cropped(&self.here, low, high);
+        let in_whole = |at: usize| {
+            let at = voxel(part.dims, at);
+            self.here.index([0, 1, 2].map(|d| low[d] + at[d]))
+        };
+        let mut centres = part.map(|_| 0u8);
+        centres.data.iter_mut().enumerate().for_each(|(at, is)| *is = u8::from(is_centre(&in_whole(at))));
+        let core = DistanceField::of_mask(&centres);
+        for at in (0..part.data.len()).filter(|at| part.data[*at] == label) {
+            let place = voxel(part.dims, at);
+            let away = away(part.centre_of(place));
+            let is_here = away > scale.from_mm && away <= scale.to_mm;
+            if is_here && f64::from(core.values().data[at]) <= reach_mm {
+                let to = borders.index([0, 1, 2].map(|d| self.low[d] + low[d] + place[d]));
+                borders.data[to] = label;
+            }
+        }
+    }
 }
 
 /// Radii of the balls: one for each size of cube, by where they are.
@@ -51,47 +120,6 @@ fn scales(config: &Config, spacing: f64) -> Vec<Scale> {
         radius_mm: 0.5 * config.least_thickness * spacing * f64::from(1u32 << level),
     };
     (0..=halvings).map(scale).filter(|scale| scale.radius_mm.is_finite()).collect()
-}
-
-/// Adds the core of one label at one scale to the regions.
-fn add_core(
-    labels: &VoxelVolume<u16>,
-    (label, block): (u16, &Block),
-    config: &Config,
-    scale: &Scale,
-    regions: &mut VoxelVolume<u16>,
-) {
-    let reach = 2.0 * scale.radius_mm;
-    let ball = config.fine.filter(|_| scale.to_mm.is_finite());
-    let ball = ball.map(|fine| (fine.centre.as_dvec3(), f64::from(fine.radius_mm) + scale.to_mm));
-    let Some((low, high)) = block.near(labels, ball, reach) else { return };
-    let here = cropped(labels, low, high);
-    let others = here.map(|found| u8::from(found != 0 && found != label));
-    let to_others = DistanceField::of_mask(&others);
-    let to_others = &to_others.values().data;
-    let mut eroded = here.map(|found| u8::from(found == label));
-    let is_deep = |at: usize| f64::from(to_others[at]) >= scale.radius_mm;
-    eroded.data.iter_mut().enumerate().for_each(|(at, kept)| *kept &= u8::from(is_deep(at)));
-    if !eroded.data.contains(&1) {
-        return;
-    }
-    let core = DistanceField::of_mask(&eroded);
-    // A ball of voxels is rounder than a ball by half of one.
-    let slack_mm = 0.5 * here.spacing_mm().length();
-    let [nx, ny, _] = here.dims;
-    for (at, _) in here.data.iter().enumerate().filter(|(_, found)| **found == label) {
-        let voxel = [at % nx, at / nx % ny, at / (nx * ny)];
-        let away =
-            |fine: super::Fine| here.centre_of(voxel).distance(fine.centre.as_dvec3()) - f64::from(fine.radius_mm);
-        let away = config.fine.map_or(f64::INFINITY, away);
-        if f64::from(core.values().data[at]) <= scale.radius_mm + slack_mm
-            && away > scale.from_mm
-            && away <= scale.to_mm
-        {
-            let to = regions.index([0, 1, 2].map(|d| low[d] + voxel[d]));
-            regions.data[to] = label;
-        }
-    }
 }
 
 /// The voxels from `low` to `high`, inclusive.

@@ -8,7 +8,7 @@ use trepan_fixtures::case_head;
 use trepan_volume::{AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, hounsfield, read, resample};
 
 /// FreeSurfer labels of the two lateral ventricles.
-const VENTRICLES: [f32; 2] = [4.0, 43.0];
+const VENTRICLES: [u16; 2] = [4, 43];
 /// Voxel edge of the distance fields, mm.
 const WORK_MM: f64 = 2.0;
 /// Lowest CT value of bone, HU.
@@ -30,8 +30,8 @@ pub struct BaseHead {
     pub mri: VoxelVolume<f32>,
     /// Brain mask, 0 or 1.
     pub brain: VoxelVolume<u8>,
-    /// Mask of the lateral ventricles, 0 or 1.
-    pub ventricles: VoxelVolume<u8>,
+    /// FreeSurfer labels of its tissues.
+    pub labels: VoxelVolume<u16>,
     pub(super) anatomy: Anatomy,
 }
 
@@ -93,20 +93,21 @@ impl BaseHead {
         let image = |path: &Path| read(path).with_context(|| format!("head {name}"));
         let ct = hounsfield(&image(ct)?).with_context(|| format!("the CT of head {name}"))?;
         let brain = image(brain)?.map(|v| u8::from(v != 0.0));
-        let ventricles = image(aseg)?.map(|v| u8::from(VENTRICLES.contains(&v)));
-        Ok(Self::new(name, ct, image(mri)?, brain, ventricles))
+        Ok(Self::new(name, ct, image(mri)?, brain, image(aseg)?.map(|v| v as u16)))
     }
 
-    /// Creates a head from images in one space; the masks lie on the MRI's grid and are not empty.
+    /// Creates a head from images in one space; brain and labels lie on the MRI's grid, and the
+    /// labels hold lateral ventricles.
     pub fn new(
         name: &'static str,
         ct: VoxelVolume<i16>,
         mri: VoxelVolume<f32>,
         brain: VoxelVolume<u8>,
-        ventricles: VoxelVolume<u8>,
+        labels: VoxelVolume<u16>,
     ) -> Self {
+        let ventricles = labels.map(|label| u8::from(VENTRICLES.contains(&label)));
         let anatomy = Anatomy::of(&ct, &mri, &brain, &ventricles);
-        Self { name, ct, mri, brain, ventricles, anatomy }
+        Self { name, ct, mri, brain, labels, anatomy }
     }
 }
 

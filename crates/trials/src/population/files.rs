@@ -14,6 +14,8 @@ pub struct Files {
     pub mri: PathBuf,
     /// True brain mask on the MRI's grid.
     pub brain: PathBuf,
+    /// True FreeSurfer labels on the MRI's grid.
+    pub labels: PathBuf,
     /// Tumour mask on the MRI's grid, if there is a tumour.
     pub tumour: Option<PathBuf>,
 }
@@ -26,11 +28,13 @@ impl Head {
             ct: folder.join("ct.nii"),
             mri: folder.join("mri.nii"),
             brain: folder.join("brain.nii"),
+            labels: folder.join("labels.nii"),
             tumour: self.tumour.as_ref().map(|_| folder.join("tumour.nii")),
         };
         nifti::write(&files.ct, &self.ct)?;
         nifti::write(&files.mri, &self.mri)?;
         nifti::write(&files.brain, &self.brain)?;
+        nifti::write(&files.labels, &self.labels)?;
         if let (Some(path), Some(labels)) = (&files.tumour, &self.tumour) {
             nifti::write(path, labels)?;
         }

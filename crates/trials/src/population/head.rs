@@ -15,6 +15,8 @@ pub struct Head {
     pub mri: VoxelVolume<f32>,
     /// True brain mask on the MRI's grid, 0 or 1.
     pub brain: VoxelVolume<u8>,
+    /// True FreeSurfer labels on the MRI's grid; 0 outside the brain.
+    pub labels: VoxelVolume<u16>,
     /// Tumour mask on the MRI's grid, 0 or 1, if there is a tumour.
     pub tumour: Option<VoxelVolume<u8>>,
     /// Recipe of the head.
@@ -34,6 +36,7 @@ impl Head {
         Self {
             ct: patient.ct(&ct_grid(recipe, &warp, base)),
             mri: patient.mri(&of_mri),
+            labels: patient.labels(&brain),
             tumour: patient.tumour_labels(&brain),
             brain,
             recipe: recipe.clone(),

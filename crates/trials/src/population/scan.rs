@@ -122,6 +122,24 @@ impl Patient<'_> {
         mask
     }
 
+    /// FreeSurfer labels on the brain's grid, by voxel centres; 0 outside the brain.
+    pub fn labels(&self, brain: &VoxelVolume<u8>) -> VoxelVolume<u16> {
+        let of_base = &self.base.labels;
+        let voxel_from_world = of_base.world_from_voxel.inverse();
+        let mut labels = brain.map(u16::from);
+        let [nx, ny, _] = labels.dims;
+        let to_world = labels.world_from_voxel;
+        labels.data.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
+            let start = to_world.transform_point3(DVec3::new(0.0, (row % ny) as f64, (row / ny) as f64));
+            self.warp.along(start, to_world.x_axis, nx, |i, place| {
+                let at = voxel_from_world.transform_point3(place.base.as_dvec3()).round();
+                let at = at.cmpge(DVec3::ZERO).all().then(|| at.to_array().map(|n| n as usize));
+                values[i] *= at.and_then(|at| of_base.get(at)).unwrap_or_default();
+            });
+        });
+        labels
+    }
+
     /// Tumour mask on the brain's grid: 1 where a brain voxel is more than half tumour.
     pub fn tumour_labels(&self, brain: &VoxelVolume<u8>) -> Option<VoxelVolume<u8>> {
         let tumour = self.tumour.as_ref()?;

@@ -1,6 +1,7 @@
 //! Tetrahedral meshes from masks and labels, measured against the voxels' faces or a closed form.
 //! Scenes: a brain at several voxel sizes, a ball, a torus and a ball in a ball.
 
+mod classes;
 mod odd;
 pub(super) mod rivals;
 mod scenes;
@@ -31,7 +32,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
         Part::new(name, move |_, findings: &mut Findings| findings.rows.extend(least_count(&make(), range)))
     });
     let odd = || Part::new("odd masks", |_, findings: &mut Findings| odd::run(findings));
-    measured.chain(searched).chain((!scope.quick).then(odd)).collect()
+    measured.chain(searched).chain(classes::parts(scope)).chain((!scope.quick).then(odd)).collect()
 }
 
 /// Smallest element count between two, to about a fifteenth, with which a mesh's boundary follows

@@ -104,6 +104,9 @@ impl Patient {
         if let Some(found) = found {
             flags.extend(["--labels".into(), path(found)]);
         }
+        for (class, codes) in [("white", "2,41"), ("grey", "3,42"), ("ventricle", "4,5,14,15,43,44")] {
+            flags.extend(["--tissue".into(), format!("{class}={}:{codes}", path(&self.files.labels))]);
+        }
         if let Some(tumour) = &self.files.tumour {
             flags.extend(["--tissue".into(), format!("tumour={}", path(tumour))]);
         }
