@@ -3,8 +3,9 @@
 //! # Practice
 //! The built-in head at the sizes of the presets and of `auto`'s largest mesh, the second head
 //! where the shared data are, and heads of the population, with small elements at an opening to the
-//! upper right. Distances are from points of the surface to the faces of the mask's voxels; an exact
-//! sphere is 0.35 mm (95 %) from those of 1 mm. What counts as the opening has edges under 3 mm.
+//! upper right. Distances are from points of the surface to the faces of the mask's voxels; by
+//! voxel centres an exact sphere is 0.35 mm (95 %) off. What counts as the opening has edges under
+//! 3 mm.
 
 use super::{Part, Scope, faults};
 use crate::engine::suite::{Findings, Gate, Row};
