@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! A tetrahedron's code is that of its class, or a larger one for a mixture. So a code minus one is
-//! the number of a material: the classes' first, then the mixtures'. A solver knows at most 256, so
+//! the number of a material: the classes' first, then the mixtures'. There are at most 255, so
 //! shares are rounded up to the finest steps that leave no more; a mixture has its tetrahedra's
 //! mean shares, and each class keeps its volume.
 
@@ -14,13 +14,13 @@ use trepan_soft::{Body, Bound, Material};
 /// Shares of a volume by class, in the order of [`TissueClass::ALL`].
 pub(crate) type Shares = [f32; TissueClass::ALL.len()];
 
-/// Most mixtures beside the classes.
-const MOST: usize = 256 - TissueClass::ALL.len();
+/// Most mixtures beside the classes: codes are bytes, and 0 is no code.
+const MOST: usize = 255 - TissueClass::ALL.len();
 /// Steps to which shares are rounded, from fine to coarse. If even one leaves too many mixtures,
 /// all tetrahedra have the mean of all.
 const STEPS: [f32; 9] = [32.0, 16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0];
 /// How the moduli of classes make those of a mixture in a session.
-pub(crate) const BOUND: Bound = Bound::Hill;
+pub(crate) const BOUND: Bound = Bound::HashinShtrikman;
 
 /// The code of each tetrahedron of a mesh whose labels are class codes, and the mixtures.
 pub(crate) fn codes(labelled: &LabelledMesh) -> (Vec<u8>, Vec<Shares>) {
@@ -101,6 +101,7 @@ mod tests {
         }
         let (codes, mixtures) = codes(&labelled);
         assert!((100..=MOST).contains(&mixtures.len()), "{}", mixtures.len());
+        assert!(codes.iter().all(|code| (1..=TissueClass::ALL.len() + mixtures.len()).contains(&usize::from(*code))));
         let mm3 = |tet: usize| labelled.mesh.volume_mm3(tet);
         let before = |class: u16| -> f64 {
             let of_class = labelled.shares.iter().filter(|share| share.label == class);

@@ -2,9 +2,14 @@
 //!
 //! # Theory
 //! Of parts with volume shares f and moduli M, equal strain gives Voigt's bound `Σ f M`, equal
-//! stress Reuss's `1 / Σ (f / M)`; the truth lies between. [`Bound::Hill`] is their mean, for shear
-//! and bulk modulus alike. The law is that of the part with most of Voigt's shear modulus. Where it
-//! is the stiffening one, its share and bound are means, weighted by what they act on.
+//! stress Reuss's `1 / Σ (f / M)`; Hill's is their mean. The best upper bound of an isotropic mix
+//! is Hashin and Shtrikman's, with K and μ of the stiffest part: it holds for soft pockets, such as
+//! fluid, in a stiffer matrix, where Hill's is half of Voigt's however few they are.
+//! ```text
+//! K* = 1 / Σ f/(Kᵢ + z) - z, z = 4/3 μ    μ* = 1 / Σ f/(μᵢ + z) - z, z = μ/6 (9 K + 8 μ)/(K + 2 μ)
+//! ```
+//! The law is that of the part with most of Voigt's shear modulus. Where it is the stiffening one,
+//! its share and bound are means, weighted by what they act on.
 //!
 //! The bulk modulus is rounded to a power of 4 times a reference's: averaged nodal pressure keeps
 //! apart elements of different bulk moduli ([`Body::bulk_groups`](crate::Body::bulk_groups)), and
@@ -12,7 +17,8 @@
 //!
 //! # Sources
 //! R. Hill: The elastic behaviour of a crystalline aggregate, Proc. Phys. Soc. A 65, 1952, with
-//! Voigt's (1889) and Reuss's (1929) bounds.
+//! Voigt's (1889) and Reuss's (1929) bounds. Z. Hashin, S. Shtrikman: A variational approach to the
+//! theory of the elastic behaviour of multiphase materials, J. Mech. Phys. Solids 11, 1963.
 
 use crate::Material;
 
@@ -25,17 +31,24 @@ pub enum Bound {
     Reuss,
     /// The mean of both.
     Hill,
+    /// The best upper bound for isotropic mixes.
+    HashinShtrikman,
 }
 
 impl Bound {
-    /// One modulus from those of parts, each with its share of the volume.
-    pub fn of(self, parts: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
-        let voigt: f64 = parts.clone().map(|(share, modulus)| share * modulus).sum();
-        let reuss = 1.0 / parts.map(|(share, modulus)| share / modulus).sum::<f64>();
+    /// Shear and bulk modulus of parts, each with its share of the volume and its two moduli.
+    pub fn of(self, parts: &[(f64, [f64; 2])]) -> [f64; 2] {
+        let most = |n: usize| parts.iter().map(|(_, moduli)| moduli[n]).fold(0.0, f64::max);
+        let mean = |n: usize, z: f64| 1.0 / parts.iter().map(|(f, moduli)| f / (moduli[n] + z)).sum::<f64>() - z;
+        let voigt = |n: usize| parts.iter().map(|(f, moduli)| f * moduli[n]).sum::<f64>();
         match self {
-            Self::Voigt => voigt,
-            Self::Reuss => reuss,
-            Self::Hill => 0.5 * (voigt + reuss),
+            Self::Voigt => [0, 1].map(voigt),
+            Self::Reuss => [0, 1].map(|n| mean(n, 0.0)),
+            Self::Hill => [0, 1].map(|n| 0.5 * (voigt(n) + mean(n, 0.0))),
+            Self::HashinShtrikman => {
+                let (mu, kappa) = (most(0), most(1));
+                [mean(0, mu / 6.0 * (9.0 * kappa + 8.0 * mu) / (kappa + 2.0 * mu)), mean(1, 4.0 / 3.0 * mu)]
+            }
         }
     }
 }
@@ -48,8 +61,8 @@ impl Material {
     pub fn mixture(parts: &[(f64, Self)], bound: Bound, reference: &Self) -> Option<Self> {
         let weight = |(share, part): &(f64, Self)| share * part.shear_mpa();
         let first = parts.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))?.1;
-        let shear = bound.of(parts.iter().map(|(share, part)| (*share, part.shear_mpa())));
-        let bulk = bound.of(parts.iter().map(|(share, part)| (*share, part.bulk_mpa())));
+        let moduli = |(share, part): &(f64, Self)| (*share, [part.shear_mpa(), part.bulk_mpa()]);
+        let [shear, bulk] = bound.of(&parts.iter().map(moduli).collect::<Vec<_>>());
         let rounded = (0.5 * (bulk / reference.bulk_mpa()).log2()).round().exp2().powi(2);
         let density = parts.iter().map(|(share, part)| share * f64::from(part.density_g_mm3())).sum::<f64>();
         let mut mixed = first.with_moduli(shear, rounded * reference.bulk_mpa(), density);
@@ -94,7 +107,7 @@ impl Material {
 mod tests {
     use super::*;
 
-    const ALL: [Bound; 3] = [Bound::Voigt, Bound::Reuss, Bound::Hill];
+    const ALL: [Bound; 4] = [Bound::Reuss, Bound::Hill, Bound::HashinShtrikman, Bound::Voigt];
 
     #[test]
     fn a_mixture_of_one_is_that_one_and_bounds_are_in_order() {
@@ -104,10 +117,16 @@ mod tests {
             assert!((mixed.bulk_mpa() / part.bulk_mpa() - 1.0).abs() < 1e-5, "{mixed:?}");
             assert_eq!(mixed.check(), Ok(()));
         }
-        let parts = [(0.25, 4.0), (0.75, 1.0)];
-        let [voigt, reuss, hill] = ALL.map(|bound| bound.of(parts.into_iter()));
-        assert!((voigt - 1.75).abs() < 1e-12 && (reuss - 16.0 / 13.0).abs() < 1e-12);
-        assert_eq!(hill, 0.5 * (voigt + reuss));
+        let parts = [(0.25, [4.0, 40.0]), (0.75, [1.0, 10.0])];
+        let [reuss, hill, upper, voigt] = ALL.map(|bound| bound.of(&parts));
+        assert_eq!((voigt, reuss.map(|m| (m * 13.0).round())), ([1.75, 17.5], [16.0, 160.0]));
+        for n in 0..2 {
+            assert_eq!(hill[n], 0.5 * (voigt[n] + reuss[n]));
+            assert!(reuss[n] < upper[n] && upper[n] < voigt[n]);
+        }
+        // A tenth of round holes: K (1 - f) / (1 + 3 K f / (4 μ)), exact for coated spheres.
+        let holes = Bound::HashinShtrikman.of(&[(0.9, [1.0, 10.0]), (0.1, [0.0, 0.0])]);
+        assert!((holes[1] - 10.0 * 0.9 / (1.0 + 0.1 * 30.0 / 4.0)).abs() < 1e-12, "{holes:?}");
     }
 
     #[test]

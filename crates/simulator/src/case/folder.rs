@@ -53,6 +53,7 @@ struct Card {
     opening: Option<Opening>,
     recipe: Option<Recipe>,
     /// Shares of the tissue classes in each mixture of the mesh.
+    #[serde(default)]
     mixtures: Vec<Shares>,
     notes: Vec<String>,
     /// Each file and its SHA-256.

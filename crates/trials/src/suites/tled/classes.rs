@@ -4,8 +4,8 @@
 //! A ball is pressed into the built-in brain at its planned opening, at rest. What counts is the
 //! force over that of brain without classes on the same mesh, so that what the mesh gets wrong
 //! anyway cancels. The truth is a mesh with borders between all classes and elements of about 2 mm
-//! for 30 mm around; shares on that mesh tell how sure it is. Shares are mixed by Reuss's, Hill's
-//! and Voigt's mean. Borders on a coarse mesh are no truth: elements of 10 mm get the class of a
+//! for 30 mm around; shares on that mesh tell how sure it is. Shares are mixed by four
+//! bounds. Borders on a coarse mesh are no truth: elements of 10 mm get the class of a
 //! point.
 //!
 //! # Practice
@@ -58,10 +58,11 @@ enum Way {
 }
 
 impl Way {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::Conforming,
         Self::Mixed(Bound::Reuss),
         Self::Mixed(Bound::Hill),
+        Self::Mixed(Bound::HashinShtrikman),
         Self::Mixed(Bound::Voigt),
         Self::Absent,
     ];
@@ -71,6 +72,7 @@ impl Way {
             Self::Conforming => "conforming",
             Self::Mixed(Bound::Reuss) => "mixed (Reuss)",
             Self::Mixed(Bound::Hill) => "mixed (Hill)",
+            Self::Mixed(Bound::HashinShtrikman) => "mixed (Hashin-Shtrikman)",
             Self::Mixed(Bound::Voigt) => "mixed (Voigt)",
             Self::Absent => "absent",
         }
@@ -186,7 +188,7 @@ fn judged(scope: Scope, findings: &mut Findings) -> Result<()> {
     let finest = scope.pick(TRUTH.0, TRUTH.1);
     let truth = pressed.press(Way::Conforming, finest, true)?;
     let mut unsettled = usize::from(!truth.at_rest);
-    let (mut truth_share, used) = (f64::NAN, Way::Mixed(Bound::Voigt));
+    let (mut truth_share, used) = (f64::NAN, Way::Mixed(Bound::HashinShtrikman));
     for (tets, is_truth) in [(finest, true)].into_iter().chain(scope.pick(SIZES.0, SIZES.1).iter().map(|n| (*n, false)))
     {
         let absent = pressed.press(Way::Absent, tets, is_truth)?;
