@@ -28,9 +28,12 @@ const UPWARDS: Vec3 = Vec3::new(0.71, 0.18, 0.68);
 /// Longest edge of a triangle at the opening, mm.
 const OPENING_MM: f32 = 3.0;
 
+/// Makes the classes of a head from the real ones; none if that head is not there.
+type Labels = Box<dyn FnOnce(&[BaseHead]) -> Option<VoxelVolume<u16>>>;
+
 /// A part for each head.
 pub(super) fn parts(scope: Scope) -> Vec<Part> {
-    let part = |name: String, labels: Box<dyn FnOnce(&[BaseHead]) -> Option<VoxelVolume<u16>>>| {
+    let part = |name: String, labels: Labels| {
         Part::new(format!("classes: {name}"), move |scope, findings: &mut Findings| {
             let heads = base_heads().expect("the built-in head is there");
             if let Some(labels) = labels(&heads) {
