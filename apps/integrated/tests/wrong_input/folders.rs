@@ -121,8 +121,8 @@ fn cases(home: &Path) {
     let cards = [
         ("case-text", "not JSON".into()),
         ("case-form", card(99, "")),
-        ("case-lacks", card(6, skull)),
-        ("case-changed", card(6, skull)),
+        ("case-lacks", card(7, skull)),
+        ("case-changed", card(7, skull)),
         ("case-pipe", String::new()),
     ];
     for (name, text) in cards {

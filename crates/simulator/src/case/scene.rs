@@ -98,7 +98,7 @@ impl RestBrain {
             fixed,
             anchors,
             materials: mixture::materials(of_classes, &self.mixtures, mixture::BOUND),
-            material_of_tet: self.class_of_tet.iter().map(|code| code - 1).collect(),
+            material_of_tet: self.class_of_tet.iter().map(|code| code.saturating_sub(1)).collect(),
         }
     }
 
