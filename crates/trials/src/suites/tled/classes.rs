@@ -14,16 +14,16 @@
 //! springs press along one normal (`outside.rs`); at 3 mm with a radius of 5 mm no surface creases.
 
 use super::Scope;
+use super::outside::press_to_rest;
 use crate::engine::picture::Series;
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::simulators::case;
 use anyhow::{Context, Result};
-use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_mesh::lattice::{Config, Domain, LabelledMesh};
 use trepan_simulator::measure::tissue::{Fineness, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes};
 use trepan_simulator::{Cache, Program, Scene, TissueClass, body_of, open_case};
-use trepan_soft::{Body, Bound, Loads, Material, SoftSolver};
+use trepan_soft::{Body, Bound, Material, SoftSolver};
 use trepan_tled::Tled;
 use trepan_volume::VoxelVolume;
 
@@ -43,8 +43,6 @@ const BRAIN_MPA: f32 = 0.003;
 const LOOKS: (u32, f32) = (60, 15.0);
 /// Duration of the press and longest rest after it, ms.
 const TIMES_MS: [f32; 2] = [120.0, 2000.0];
-/// Change of the force in 50 ms at which the tissue is at rest, as a share.
-const STILL: f64 = 2e-4;
 
 /// How classes enter a mesh.
 #[derive(Clone, Copy, PartialEq)]
@@ -146,32 +144,14 @@ impl Pressed {
             ..trepan_tled::Config::default()
         };
         let mut solver = Tled::new(&body, &config)?;
-        let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
-        let (mut now, mut next, mut force_n, mut before) = (0.0f32, 0.0f32, 0.0f64, f64::INFINITY);
-        while now < TIMES_MS[1] && (now < 2.0 * TIMES_MS[0] || (force_n / before - 1.0).abs() > STILL) {
-            let share = (now / TIMES_MS[0]).min(1.0);
-            let ball = PressedBall { middle, normal: self.normal, radius_mm, depth_mm: share * depth_mm };
-            ball.press(&surface, &mut loads.contacts);
-            next += if share < 1.0 { 4.0 } else { 50.0 };
-            while now < next {
-                let dt_ms = solver.next_dt_ms().min(1.0);
-                solver.step(&loads, dt_ms);
-                now += dt_ms;
-            }
-            before = force_n;
-            force_n = PressedBall::force_n(&loads.contacts, solver.positions());
-        }
+        let ball = PressedBall { middle, normal: self.normal, radius_mm, depth_mm };
+        let (force_n, at_rest) = press_to_rest(&mut solver, &ball, &surface, TIMES_MS);
         let at = |n: u32| solver.positions()[n as usize] - body.mesh.positions[n as usize];
         let moved = disc(LOOKS.1, LOOKS.0, self.normal).map(|aside| {
             let (_, nodes) = surface.under(middle + aside);
             nodes.into_iter().map(|(n, weight)| weight * at(n)).sum()
         });
-        Ok(Answer {
-            tets: body.mesh.tets.len(),
-            force_n,
-            moved: moved.collect(),
-            at_rest: (force_n / before - 1.0).abs() <= STILL,
-        })
+        Ok(Answer { tets: body.mesh.tets.len(), force_n, moved: moved.collect(), at_rest })
     }
 }
 

@@ -298,16 +298,17 @@ fn row(scene: &str, method: &str, tets: usize, [displacement, force]: [f64; 2], 
         .metric("force_n", force_n)
 }
 
-/// Presses by TLED as a session steps it, until rest; force, N, and errors of displacement and
-/// force, percent.
-fn step(pressed: &Pressed, averaged_pressure: bool, truth: &Solution) -> Result<(f64, [f64; 2])> {
-    let Pressed { body, surface, ball, .. } = pressed;
-    let config = Config { mass_scaling: MASS_ADDED, averaged_pressure, ..Config::default() };
-    let mut solver = Tled::new(body, &config)?;
+/// Presses over a time, then waits until rest or another time, ms; force, N, and whether it rests.
+pub(super) fn press_to_rest(
+    solver: &mut Tled,
+    ball: &PressedBall,
+    surface: &Surroundings,
+    times_ms: [f32; 2],
+) -> (f64, bool) {
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
     let (mut now, mut next, mut force_n, mut before) = (0.0f32, 0.0f32, 0.0f64, f64::INFINITY);
-    while now < TIMES_MS[1] && (now < 2.0 * TIMES_MS[0] || (force_n / before - 1.0).abs() > STILL) {
-        let share = (now / TIMES_MS[0]).min(1.0);
+    while now < times_ms[1] && (now < 2.0 * times_ms[0] || (force_n / before - 1.0).abs() > STILL) {
+        let share = (now / times_ms[0]).min(1.0);
         PressedBall { depth_mm: share * ball.depth_mm, ..*ball }.press(surface, &mut loads.contacts);
         next += if share < 1.0 { 4.0 } else { 50.0 };
         while now < next {
@@ -318,6 +319,16 @@ fn step(pressed: &Pressed, averaged_pressure: bool, truth: &Solution) -> Result<
         before = force_n;
         force_n = PressedBall::force_n(&loads.contacts, solver.positions());
     }
+    (force_n, (force_n / before - 1.0).abs() <= STILL)
+}
+
+/// Presses by TLED as a session steps it, until rest; force, N, and errors of displacement and
+/// force, percent.
+fn step(pressed: &Pressed, averaged_pressure: bool, truth: &Solution) -> Result<(f64, [f64; 2])> {
+    let Pressed { body, surface, ball, .. } = pressed;
+    let config = Config { mass_scaling: MASS_ADDED, averaged_pressure, ..Config::default() };
+    let mut solver = Tled::new(body, &config)?;
+    let (force_n, _) = press_to_rest(&mut solver, ball, surface, TIMES_MS);
     let moved = truth.places_mm.iter().map(|&place| {
         let (_, nodes) = surface.under(Vec3::from_array(place));
         nodes.into_iter().map(|(n, w)| w * (solver.positions()[n as usize] - body.mesh.positions[n as usize])).sum()
