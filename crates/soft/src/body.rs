@@ -1,8 +1,9 @@
 //! A body: tetrahedra, what they are made of, and which nodes do not move.
 
 use crate::{Anchor, Material, MaterialError, Shape};
+use glam::DVec3;
 use trepan_geometry::Vec3;
-use trepan_mesh::TetMesh;
+use trepan_mesh::{Csr, TetMesh, Topology};
 
 /// A deformable body in its rest state.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,8 +99,13 @@ pub enum BodyError {
         /// Nodes in the mesh.
         nodes: usize,
     },
+    /// One of several parts of a held body is not held.
+    #[error("nothing holds the part with mesh.tets[{0}]: fix or anchor a node of it, or drop the part")]
+    Loose(usize),
     /// A static solver was given a body that can float away.
-    #[error("fixed holds {0} nodes: a static solver needs at least 3 that are not on one line")]
+    #[error(
+        "fixed does not hold the part with mesh.tets[{0}]: it needs at least 3 nodes there that are not on one line"
+    )]
     Floating(usize),
     /// A setting of the solver makes no sense.
     #[error("config.{field} is {value}: {right}")]
@@ -190,9 +196,37 @@ impl Body {
         if let Some((index, anchor)) = self.anchors.iter().enumerate().find(|(_, anchor)| is_wrong(anchor)) {
             return Err(BodyError::Anchor { index, node: anchor.node, nodes });
         }
-        match self.fixed.iter().find(|&&n| n as usize >= nodes) {
-            Some(&node) => Err(BodyError::FixedRange { node, nodes }),
+        if let Some(&node) = self.fixed.iter().find(|&&n| n as usize >= nodes) {
+            return Err(BodyError::FixedRange { node, nodes });
+        }
+        let mut held = self.fixed_mask();
+        self.anchors.iter().for_each(|anchor| held[anchor.node as usize] = true);
+        let is_free = !held.contains(&true);
+        match self.loose(held, |points| !points.is_empty()).filter(|_| !is_free) {
+            Some(tet) => Err(BodyError::Loose(tet)),
             None => Ok(()),
+        }
+    }
+
+    /// The first tetrahedron of a part, connected by faces, of which `held` nodes are not enough.
+    /// A part that is held holds others by the nodes that it shares with them.
+    fn loose(&self, mut held: Vec<bool>, is_enough: impl Fn(&[DVec3]) -> bool) -> Option<usize> {
+        let (part_of, parts) = Topology::of(&self.mesh).components();
+        let tets_of = Csr::of_pairs(parts, part_of.iter().zip(0..).map(|(&part, tet)| (part, tet)));
+        let mut open: Vec<usize> = (0..parts).collect();
+        loop {
+            let before = open.len();
+            open.retain(|&part| {
+                let nodes = || tets_of.row(part).iter().flat_map(|&tet| self.mesh.tets[tet as usize]);
+                let held_here = nodes().filter(|&n| held[n as usize]);
+                let points: Vec<_> = held_here.map(|n| self.mesh.positions[n as usize].as_dvec3()).collect();
+                let is_loose = !is_enough(&points);
+                nodes().for_each(|n| held[n as usize] |= !is_loose);
+                is_loose
+            });
+            if open.len() == before {
+                return open.first().map(|&part| tets_of.row(part)[0] as usize);
+            }
         }
     }
 
@@ -238,17 +272,25 @@ impl Body {
         mask
     }
 
-    /// Whether the fixed nodes hold the body: three of them span a plane.
+    /// Whether the fixed nodes hold every part of the body: three of them span a plane.
     pub fn is_supported(&self) -> bool {
-        let points = || self.fixed.iter().map(|&n| self.mesh.positions[n as usize].as_dvec3());
-        let Some(origin) = points().next() else { return false };
-        let furthest = |measure: &dyn Fn(glam::DVec3) -> f64| {
-            points().max_by(|a, b| measure(*a).total_cmp(&measure(*b))).map(|p| (p, measure(p)))
-        };
-        let Some((far, length)) = furthest(&|p| (p - origin).length()) else { return false };
-        let axis = (far - origin).normalize_or_zero();
-        furthest(&|p| (p - origin).cross(axis).length()).is_some_and(|(_, width)| width > 1e-3 * length && length > 0.0)
+        self.unsupported().is_none()
     }
+
+    /// A tetrahedron of the first part that the fixed nodes do not hold.
+    pub fn unsupported(&self) -> Option<usize> {
+        self.loose(self.fixed_mask(), span_a_plane)
+    }
+}
+
+fn span_a_plane(points: &[DVec3]) -> bool {
+    let Some(&origin) = points.first() else { return false };
+    let furthest = |measure: &dyn Fn(DVec3) -> f64| {
+        points.iter().max_by(|a, b| measure(**a).total_cmp(&measure(**b))).map(|&p| (p, measure(p)))
+    };
+    let Some((far, length)) = furthest(&|p| (p - origin).length()) else { return false };
+    let axis = (far - origin).normalize_or_zero();
+    furthest(&|p| (p - origin).cross(axis).length()).is_some_and(|(_, width)| width > 1e-3 * length && length > 0.0)
 }
 
 #[cfg(test)]
@@ -309,5 +351,33 @@ mod tests {
         assert!(!body.is_supported());
         body.fixed.clear();
         assert!(!body.is_supported());
+    }
+
+    #[test]
+    fn every_part_must_be_held() {
+        let mut body = cube();
+        let count = body.mesh.positions.len() as u32;
+        let beside = |body: &mut Body, shift: Vec3| {
+            let copy: Vec<Vec3> = body.mesh.positions[..27].iter().map(|&p| p + shift).collect();
+            body.mesh.positions.extend(copy);
+            let tets: Vec<[u32; 4]> = body.mesh.tets.iter().map(|t| t.map(|n| n + count)).collect();
+            body.mesh.tets.extend(tets);
+            body.material_of_tet = vec![0; body.mesh.tets.len()];
+        };
+        beside(&mut body, Vec3::X * 50.0);
+        assert_eq!((body.check(), body.unsupported()), (Err(BodyError::Loose(48)), Some(48)));
+        let held = Body { fixed: body.fixed.iter().flat_map(|&n| [n, n + count]).collect(), ..body.clone() };
+        assert_eq!((held.check(), held.is_supported()), (Ok(()), true));
+        let anchored = Body { anchors: vec![Anchor { node: count, ..Anchor::default() }], ..body.clone() };
+        assert_eq!((anchored.check(), anchored.is_supported()), (Ok(()), false));
+        let free = Body { fixed: Vec::new(), ..body.clone() };
+        assert_eq!((free.check(), free.unsupported()), (Ok(()), Some(0)));
+        // The second part hangs on one node of the first: held for a dynamic solver, but it can turn.
+        body.mesh.tets[48..].iter_mut().flatten().for_each(|n| *n = if *n == count { 0 } else { *n });
+        let mut hanging = body;
+        hanging.mesh.positions.remove(count as usize);
+        hanging.mesh.tets.iter_mut().flatten().for_each(|n| *n -= u32::from(*n > count));
+        hanging.mesh.positions[27..].iter_mut().for_each(|p| *p -= Vec3::X * 50.0);
+        assert_eq!((hanging.check(), hanging.unsupported()), (Ok(()), Some(48)));
     }
 }

@@ -97,8 +97,8 @@ impl Reference {
         body.check()?;
         let cells = Cells::of(body, config.order);
         let factor = Factor::of(&cells.fixed, cells.cells.iter().map(|cell| &cell.nodes[..]));
-        let factor =
-            factor.filter(|_| config.motion || body.is_supported()).ok_or(BodyError::Floating(body.fixed.len()))?;
+        let loose = if config.motion { None } else { body.unsupported() };
+        let factor = factor.filter(|_| loose.is_none()).ok_or(BodyError::Floating(loose.unwrap_or_default()))?;
         let zero = || vec![DVec3::ZERO; cells.rest.len()];
         Ok(Self {
             config: *config,
