@@ -118,6 +118,22 @@ impl TetMesh {
         used
     }
 
+    /// Removes tetrahedra with the same four nodes as an earlier one, in whatever order.
+    pub(crate) fn without_repeats(mut self) -> Self {
+        let key = |tet: &[u32; 4]| {
+            let mut nodes = *tet;
+            nodes.sort_unstable();
+            nodes
+        };
+        let mut order: Vec<usize> = (0..self.tets.len()).collect();
+        order.sort_by_key(|&t| key(&self.tets[t]));
+        let mut first = vec![false; self.tets.len()];
+        order.chunk_by(|&a, &b| key(&self.tets[a]) == key(&self.tets[b])).for_each(|same| first[same[0]] = true);
+        let mut first = first.into_iter();
+        self.tets.retain(|_| first.next() == Some(true));
+        self
+    }
+
     /// Removes nodes that no tetrahedron uses, keeping the order of the others.
     pub fn without_orphans(&self) -> Self {
         let used = self.used_nodes();

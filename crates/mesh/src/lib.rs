@@ -41,8 +41,9 @@ mod triangles;
 
 pub use check::MeshError;
 pub use file::{
-    FileError, Format, SURFACE_FORMATS, VOLUME_FORMATS, abaqus, gmsh, medit, obj, ply, read, read_among, read_surface,
-    stl, tetgen, vtk, vtu, write, write_among, write_surface,
+    FileError, Format, Import, Note, SURFACE_FORMATS, VOLUME_FORMATS, abaqus, gmsh, import, import_among,
+    import_surface, medit, obj, ply, read, read_among, read_surface, stl, tetgen, vtk, vtu, write, write_among,
+    write_surface,
 };
 pub use isosurface::isosurface;
 pub use quality::Quality;

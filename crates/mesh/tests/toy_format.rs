@@ -2,18 +2,18 @@
 
 use std::path::Path;
 use trepan_geometry::Vec3;
-use trepan_mesh::{FileError, Format, TetMesh, VOLUME_FORMATS, read_among, write_among};
+use trepan_mesh::{FileError, Format, Import, TetMesh, VOLUME_FORMATS, read_among, write_among};
 
 /// One tetrahedron at the origin with the edge in the file, mm.
 const TOY: Format<TetMesh> =
-    Format { name: "toy (.toy)", endings: &["toy"], starts: &["one tetrahedron of "], read, write };
+    Format { name: "toy (.toy)", endings: &["toy"], starts: &["one tetrahedron of "], import, write };
 
-fn read(path: &Path) -> Result<TetMesh, FileError> {
+fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
     let io = |source| FileError::Io { path: path.into(), source };
     let text = std::fs::read_to_string(path).map_err(io)?;
     let edge_mm: f32 = text[TOY.starts[0].len()..].parse().unwrap_or(1.0);
     let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| edge_mm * p).to_vec();
-    Ok(TetMesh { positions, tets: vec![[0, 1, 2, 3]] })
+    Ok(Import { mesh: TetMesh { positions, tets: vec![[0, 1, 2, 3]] }, notes: Vec::new() })
 }
 
 fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {

@@ -1,6 +1,6 @@
 //! Descriptor of a mesh format: what it is called, how it is recognised, read and written.
 
-use crate::file::FileError;
+use crate::file::{FileError, Import};
 use std::path::Path;
 
 /// A file format of tetrahedra or of a surface.
@@ -12,8 +12,8 @@ pub struct Format<M> {
     pub endings: &'static [&'static str],
     /// The texts that its files may begin with. Without any, the ending decides.
     pub starts: &'static [&'static str],
-    /// Reads a file. Only indices need to be checked.
-    pub read: fn(&Path) -> Result<M, FileError>,
+    /// Reads a file, with notes. Only indices need to be checked.
+    pub import: fn(&Path) -> Result<Import<M>, FileError>,
     /// Writes a file, atomically.
     pub write: fn(&Path, &M) -> Result<(), FileError>,
 }

@@ -3,12 +3,12 @@
 //! # Theory
 //! Sections between `$Name` and `$EndName` (`$NOD` and `$ELM` in version 1). Nodes and elements
 //! carry their own numbers. Version 2.2 gives each element its type and tags; version 4.1 groups
-//! both by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one. Binary
-//! files hold little-endian i32, u64 and f64 after the counts.
+//! both by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one, 29 to 31
+//! those of higher order. Binary files hold little-endian i32, u64 and f64 after the counts.
 //!
 //! # Practice
-//! Tetrahedra are read (of type 11 the corners); other elements and all tags are skipped. Writes
-//! 2.2 as text, with enough digits to restore each f32. Positions are mm; the corner order is that
+//! Tetrahedra are read (of more nodes the corners), once if several physical groups list them; other
+//! elements and all tags are skipped. Writes 2.2 as text, with enough digits to restore each f32. Positions are mm; the corner order is that
 //! of [`TetMesh`]. Version 4.0 is rejected.
 //!
 //! # Sources
@@ -16,15 +16,16 @@
 
 use crate::TetMesh;
 use crate::file::numbered::Numbered;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{Elements, FileError, Format, Import, Reader, write_atomically};
 use std::path::Path;
 
 /// The format.
-pub const FORMAT: Format<TetMesh> = Format { name: "Gmsh (.msh)", endings: &["msh"], starts: &["$"], read, write };
+pub const FORMAT: Format<TetMesh> =
+    Format { name: "Gmsh (.msh)", endings: &["msh"], starts: &["$MeshFormat", "$NOD"], import, write };
 
 /// Reads the tetrahedra of a Gmsh file. Only indices are checked; call [`TetMesh::check`] for the
 /// rest.
-pub fn read(path: &Path) -> Result<TetMesh, FileError> {
+pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
     parse(Reader::open(path)?)
 }
 
@@ -40,10 +41,17 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     })
 }
 
-pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
+pub(crate) fn parse(mut reader: Reader) -> Result<Import<TetMesh>, FileError> {
     let first = reader.line().unwrap_or_default();
     if first.trim() == "$NOD" {
-        return Gmsh { reader, binary: false, nodes: Numbered::default(), tets: Vec::new() }.version_1();
+        return Gmsh {
+            reader,
+            binary: false,
+            nodes: Numbered::default(),
+            tets: Vec::new(),
+            beside: Elements::default(),
+        }
+        .version_1();
     }
     if first.trim() != "$MeshFormat" {
         return Err(reader.error("line 1", first, "$MeshFormat, or $NOD in version 1"));
@@ -63,7 +71,7 @@ pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
     if binary && i32::from_le_bytes(reader.array("the byte order mark")?) != 1 {
         return Err(reader.error("the byte order mark", "not 1", "1: the file must be little-endian"));
     }
-    let file = Gmsh { reader, binary, nodes: Numbered::default(), tets: Vec::new() };
+    let file = Gmsh { reader, binary, nodes: Numbered::default(), tets: Vec::new(), beside: Elements::default() };
     file.sections(newer)
 }
 
@@ -73,10 +81,12 @@ struct Gmsh {
     nodes: Numbered,
     /// Corners by node number.
     tets: Vec<[u64; 4]>,
+    /// The counts of other elements.
+    beside: Elements,
 }
 
 impl Gmsh {
-    fn sections(mut self, newer: bool) -> Result<TetMesh, FileError> {
+    fn sections(mut self, newer: bool) -> Result<Import<TetMesh>, FileError> {
         while let Some(line) = self.reader.line() {
             match (line.trim(), newer) {
                 ("$Nodes", false) => self.nodes_2()?,
@@ -93,7 +103,7 @@ impl Gmsh {
         self.finish()
     }
 
-    fn version_1(mut self) -> Result<TetMesh, FileError> {
+    fn version_1(mut self) -> Result<Import<TetMesh>, FileError> {
         self.nodes_2()?;
         self.reader.skip_past_line("$ELM")?;
         let count = self.count_line("the count of $ELM", 8, 8)?;
@@ -114,11 +124,11 @@ impl Gmsh {
         self.finish()
     }
 
-    fn finish(mut self) -> Result<TetMesh, FileError> {
+    fn finish(mut self) -> Result<Import<TetMesh>, FileError> {
         self.nodes.sort(&self.reader)?;
         let corners = |(t, numbers): (usize, &[u64; 4])| self.nodes.corners(&self.reader, t, *numbers);
         let tets = self.tets.iter().enumerate().map(corners).collect::<Result<_, _>>()?;
-        self.reader.mesh(self.nodes.positions, tets)
+        self.reader.mesh(self.nodes.positions, Elements { tets, ..self.beside })
     }
 
     /// A 4-byte number of a binary file, or a word of a text.
@@ -234,7 +244,7 @@ impl Gmsh {
     /// Reads the nodes of an element; keeps tetrahedra.
     fn element(&mut self, kind: u64, number: fn(&mut Self, &str) -> Result<u64, FileError>) -> Result<(), FileError> {
         let Some(nodes) = nodes_of(kind) else {
-            return Err(self.reader.error("an element's type", kind, "one of 1 to 19 (see the Gmsh manual)"));
+            return Err(self.reader.error("an element's type", kind, "one of 1 to 31 (see the Gmsh manual)"));
         };
         let mut corners = [0; 4];
         for at in 0..nodes {
@@ -243,8 +253,13 @@ impl Gmsh {
                 corners[at] = node;
             }
         }
-        if kind == 4 || kind == 11 {
-            self.tets.push(corners);
+        match kind {
+            4 => self.tets.push(corners),
+            11 | 29..=31 => {
+                self.beside.of_more_nodes += 1;
+                self.tets.push(corners);
+            }
+            _ => self.beside.others += 1,
         }
         Ok(())
     }
@@ -252,7 +267,8 @@ impl Gmsh {
 
 /// Number of nodes of an element type.
 fn nodes_of(kind: u64) -> Option<usize> {
-    const NODES: [usize; 19] = [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13];
+    const NODES: [usize; 31] =
+        [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56];
     let at = usize::try_from(kind).ok()?.checked_sub(1)?;
     NODES.get(at).copied()
 }
@@ -260,7 +276,8 @@ fn nodes_of(kind: u64) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::tests::{octahedron, of_text, survive_mutations};
+    use crate::Note;
+    use crate::file::tests::{octahedron, of_bytes, of_text, survive_mutations};
 
     const OLD: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"brain\"\n$EndPhysicalNames\n$Nodes\n4\n7 0 0 0\n8 1 0 0\n9 0 1 0\n\
                        10 0 0 1\n$EndNodes\n$Elements\n2\n1 2 2 1 1 7 8 9\n2 4 2 1 1 7 8 9 10\n$EndElements\n";
@@ -289,7 +306,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.msh");
         write(&path, &octahedron()).unwrap();
-        assert_eq!(read(&path).unwrap(), octahedron());
+        assert_eq!(import(&path).unwrap().mesh, octahedron());
     }
 
     #[test]
@@ -298,7 +315,37 @@ mod tests {
         assert_eq!(old.tets, [[0, 1, 2, 3]]);
         assert_eq!(old, of_text(NEW, parse).unwrap());
         assert_eq!(old, of_text(OLDEST, parse).unwrap());
-        assert_eq!(old, parse(Reader::of(Path::new("binary"), old_binary())).unwrap());
+        assert_eq!(old, of_bytes(&old_binary(), parse).unwrap().mesh);
+    }
+
+    #[test]
+    fn a_tetrahedron_in_two_groups_counts_once() {
+        let text = |old: &str, from: [&str; 2], to: [&str; 2]| old.replace(from[0], to[0]).replace(from[1], to[1]);
+        let again = text(OLD, ["$Elements\n2", "$EndElements"], ["$Elements\n3", "3 4 2 2 1 10 9 8 7\n$EndElements"]);
+        let new =
+            text(NEW, ["$Elements\n2 2", "$EndElements"], ["$Elements\n3 3", "3 2 4 1\n2 7 8 9 10\n$EndElements"]);
+        let mut binary = old_binary();
+        let one = [4, 1, 1, 2, 5, 7, 8, 9, 10].map(i32::to_le_bytes).concat();
+        let end = binary.len() - b"\n$EndElements\n".len();
+        binary.splice(end..end, one);
+        let at = binary.windows(11).position(|w| w == b"$Elements\n2").unwrap();
+        binary[at + 10] = b'3';
+        for bytes in [again.as_bytes(), new.as_bytes(), &binary] {
+            let import = of_bytes(bytes, parse).unwrap();
+            assert_eq!(import.mesh, of_text(OLD, parse).unwrap());
+            assert_eq!(import.notes[..2], [Note::Others(1), Note::Repeated(1)]);
+        }
+    }
+
+    #[test]
+    fn of_higher_order_the_corners_are_read() {
+        let text = OLD.replace("$Nodes\n4", "$Nodes\n5\n1 0.5 0 0");
+        for (kind, more) in [(11, 6), (29, 16), (30, 31), (31, 52)] {
+            let text = text.replace("2 4 2 1 1 7 8 9 10", &format!("2 {kind} 2 1 1 7 8 9 10{}", " 1".repeat(more)));
+            let import = of_bytes(text.as_bytes(), parse).unwrap();
+            assert_eq!(import.mesh, of_text(OLD, parse).unwrap());
+            assert_eq!(import.notes, [Note::Corners(1), Note::Others(1), Note::Orphans(1)]);
+        }
     }
 
     #[test]

@@ -2,11 +2,11 @@
 //!
 //! # Practice
 //! A format is one file with a [`Format`]; its name in one of the two lists brings it to the
-//! programs. [`read_among`] and [`write_among`] use it from any crate (`tests/toy_format.rs`).
+//! programs. [`import_among`] and [`write_among`] use it from any crate (`tests/toy_format.rs`).
 //! Reading detects the content first, since programs use `.mesh`, `.msh` and `.vtk` differently;
 //! writing uses the ending.
 
-use crate::file::{FileError, Format};
+use crate::file::{FileError, Format, Import};
 use crate::{TetMesh, TriMesh, abaqus, gmsh, medit, obj, ply, stl, tetgen, vtk, vtu};
 use std::io::Read;
 use std::path::Path;
@@ -28,9 +28,19 @@ pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     read_among(VOLUME_FORMATS, path)
 }
 
+/// Reads tetrahedra as [`read`] does, with notes about the file.
+pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
+    import_among(VOLUME_FORMATS, path)
+}
+
 /// Reads a triangle surface from a file of any of the [`SURFACE_FORMATS`].
 pub fn read_surface(path: &Path) -> Result<TriMesh, FileError> {
     read_among(SURFACE_FORMATS, path)
+}
+
+/// Reads a triangle surface, with notes about the file.
+pub fn import_surface(path: &Path) -> Result<Import<TriMesh>, FileError> {
+    import_among(SURFACE_FORMATS, path)
 }
 
 /// Writes tetrahedra in the format of the file's ending.
@@ -43,17 +53,27 @@ pub fn write_surface(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_among(SURFACE_FORMATS, path, mesh)
 }
 
-/// Reads a file in the one of `formats` that its first bytes belong to, else in that of its ending.
+/// Reads a file as [`import_among`] does, without its notes.
 pub fn read_among<M>(formats: &[Format<M>], path: &Path) -> Result<M, FileError> {
+    import_among(formats, path).map(|import| import.mesh)
+}
+
+/// Reads a file in the one of `formats` that its first bytes belong to, else in that of its ending.
+pub fn import_among<M>(formats: &[Format<M>], path: &Path) -> Result<Import<M>, FileError> {
     let named = formats.iter().find(|format| format.endings.contains(&ending(path).as_str()));
     if let Some(format) = named.filter(|format| format.starts.is_empty()) {
-        return (format.read)(path);
+        return (format.import)(path);
     }
     let start = start(path).map_err(|source| FileError::Io { path: path.into(), source })?;
     let begins = |format: &&Format<M>| format.starts.iter().any(|text| start.starts_with(text.as_bytes()));
     match formats.iter().find(begins).or(named) {
-        Some(format) => (format.read)(path),
-        None => Err(unknown(path, "the format", "unknown".into(), formats)),
+        Some(format) => (format.import)(path),
+        None => {
+            // The comments of a Nastran deck begin with $.
+            let nastran = start.starts_with(b"$") || ["bdf", "nas", "fem"].contains(&ending(path).as_str());
+            let got = if nastran { "perhaps Nastran, which is not read (meshio converts it)" } else { "unknown" };
+            Err(unknown(path, "the format", got.into(), formats))
+        }
     }
 }
 
@@ -84,8 +104,9 @@ fn unknown<M>(path: &Path, field: &str, got: String, formats: &[Format<M>]) -> F
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Surface;
     use crate::file::tests::octahedron;
+    use crate::{Note, Surface};
+    use trepan_geometry::Vec3;
 
     #[test]
     fn every_format_gives_the_same_mesh_back() {
@@ -105,6 +126,42 @@ mod tests {
     }
 
     #[test]
+    fn space_is_written_and_lps_turns_a_mesh_by_half() {
+        let folder = tempfile::tempdir().unwrap();
+        let in_lps = |path: &Path, said: [&[u8]; 2]| {
+            let mut bytes = std::fs::read(path).unwrap();
+            let at = bytes.windows(said[0].len()).position(|w| w == said[0]).expect("it says its space");
+            bytes[at..at + said[0].len()].copy_from_slice(said[1]);
+            std::fs::write(path, bytes).unwrap();
+        };
+        let turned = |p: &Vec3| Vec3::new(-p.x, -p.y, p.z);
+        let mesh = octahedron();
+        let words: [&[u8]; 2] = [b"SPACE=RAS", b"SPACE=LPS"];
+        let codes: [&[u8]; 2] = [b">82 65 83 0<", b">76 80 83 0<"];
+        for (name, said) in [("mesh.vtk", words), ("mesh.vtu", codes)] {
+            let path = folder.path().join(name);
+            write(&path, &mesh).unwrap();
+            assert!(import(&path).unwrap().notes.is_empty());
+            in_lps(&path, said);
+            let read = import(&path).unwrap();
+            assert_eq!((read.mesh.check(), read.notes), (Ok(()), vec![Note::Lps]), "{name}");
+            assert!(read.mesh.positions.iter().eq(mesh.positions.iter().map(turned).collect::<Vec<_>>().iter()));
+        }
+        let surface = Surface::of(&mesh).to_tri_mesh(&mesh.positions);
+        for name in ["surface.stl", "surface.obj", "surface.ply"] {
+            let path = folder.path().join(name);
+            write_surface(&path, &surface).unwrap();
+            let ras = import_surface(&path).unwrap();
+            in_lps(&path, words);
+            let lps = import_surface(&path).unwrap();
+            assert_eq!((ras.notes, lps.notes), (vec![], vec![Note::Lps]), "{name}");
+            assert_eq!(lps.mesh.triangles, ras.mesh.triangles);
+            assert!(lps.mesh.positions.iter().eq(ras.mesh.positions.iter().map(turned).collect::<Vec<_>>().iter()));
+            assert!((lps.mesh.volume_mm3() - mesh.total_mm3()).abs() < 1e-5, "{name}");
+        }
+    }
+
+    #[test]
     fn the_content_decides_before_the_ending() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.msh");
@@ -112,6 +169,17 @@ mod tests {
         let renamed = folder.path().join("mesh.mesh");
         std::fs::rename(&path, &renamed).unwrap();
         assert_eq!(read(&renamed).unwrap(), octahedron());
+    }
+
+    #[test]
+    fn nastran_is_not_taken_for_gmsh() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("head.bdf");
+        for text in ["$ a head\nBEGIN BULK\nGRID,1,,0.,0.,0.\nENDDATA\n", "SOL 101\nCEND\n"] {
+            std::fs::write(&path, text).unwrap();
+            let fault = read(&path).unwrap_err().to_string();
+            assert!(fault.contains("head.bdf: the format is perhaps Nastran") && fault.contains(".vtk"), "{fault}");
+        }
     }
 
     #[test]

@@ -2,28 +2,28 @@
 //!
 //! # Theory
 //! A list of sections, each a keyword, a count and that many rows: `Vertices` (x y z reference) and
-//! `Tetrahedra` (four nodes from 1, reference). Other sections (triangles, corners, ridges) are
-//! skipped up to the next keyword.
+//! `Tetrahedra` (four nodes from 1, reference), or `TetrahedraP2` (ten). Other sections (triangles,
+//! corners, ridges) are skipped up to the next keyword.
 //!
 //! # Practice
-//! Reads the text form, dimension 3; references are skipped. Writes version 2 with enough digits to
+//! Reads the text form, dimension 3; references and nodes on edges are skipped. Writes version 2 with enough digits to
 //! restore each f32. Positions are mm; the corner order is that of [`TetMesh`].
 //!
 //! # Sources
 //! P. Frey: MEDIT, an interactive mesh visualization software, INRIA RT-0253, 2001.
 
 use crate::TetMesh;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{Elements, FileError, Format, Import, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
 
 /// The format.
 pub const FORMAT: Format<TetMesh> =
-    Format { name: "Medit (.mesh)", endings: &["mesh"], starts: &["MeshVersionFormatted"], read, write };
+    Format { name: "Medit (.mesh)", endings: &["mesh"], starts: &["MeshVersionFormatted"], import, write };
 
 /// Reads the tetrahedra of a Medit file. Only indices are checked; call [`TetMesh::check`] for the
 /// rest.
-pub fn read(path: &Path) -> Result<TetMesh, FileError> {
+pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
     parse(Reader::open(path)?)
 }
 
@@ -38,21 +38,34 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     })
 }
 
-pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
+/// Sections of elements that are no tetrahedra.
+const OTHERS: [&str; 6] = ["Edges", "Triangles", "Quadrilaterals", "Hexahedra", "Prisms", "Pyramids"];
+
+pub(crate) fn parse(mut reader: Reader) -> Result<Import<TetMesh>, FileError> {
     reader.comment = Some(b'#');
     let first = reader.word().unwrap_or_default().to_owned();
     if first != "MeshVersionFormatted" {
         return Err(reader.error("the first word", first, "MeshVersionFormatted (the text form of Medit)"));
     }
     let _version: u32 = reader.number("MeshVersionFormatted", "1 to 4")?;
-    let (mut positions, mut tets) = (Vec::new(), Vec::new());
+    let (mut positions, mut elements) = (Vec::new(), Elements::default());
     loop {
         match reader.word().unwrap_or("End").to_owned().as_str() {
-            "End" => return reader.mesh(positions, tets),
+            "End" => return reader.mesh(positions, elements),
             "Dimension" => dimension(&mut reader)?,
             "Vertices" => positions = vertices(&mut reader)?,
-            "Tetrahedra" => tets = tetrahedra(&mut reader)?,
-            other if other.parse::<f64>().is_err() => reader.skip_numbers(),
+            "Tetrahedra" => elements.tets.extend(tetrahedra(&mut reader, 4)?),
+            "TetrahedraP2" => {
+                let tets = tetrahedra(&mut reader, 10)?;
+                elements.of_more_nodes += tets.len();
+                elements.tets.extend(tets);
+            }
+            other if other.parse::<f64>().is_err() => {
+                let count = reader.skip_numbers().unwrap_or_default() as usize;
+                if OTHERS.contains(&other.trim_end_matches("P2")) {
+                    elements.others = elements.others.saturating_add(count);
+                }
+            }
             number => return Err(reader.error("a keyword", number, "a word; is a count before it too small?")),
         }
     }
@@ -73,7 +86,8 @@ fn vertices(reader: &mut Reader) -> Result<Vec<Vec3>, FileError> {
     Ok(positions)
 }
 
-fn tetrahedra(reader: &mut Reader) -> Result<Vec<[u32; 4]>, FileError> {
+/// The corners of elements of `nodes` nodes.
+fn tetrahedra(reader: &mut Reader, nodes: usize) -> Result<Vec<[u32; 4]>, FileError> {
     let count = reader.count("the count of Tetrahedra", 10)?;
     let mut tets = Vec::with_capacity(count);
     for tet in 0..count {
@@ -84,7 +98,7 @@ fn tetrahedra(reader: &mut Reader) -> Result<Vec<[u32; 4]>, FileError> {
             *corner = number.checked_sub(1).ok_or_else(|| reader.error(&field, number, "of nodes from 1"))?;
         }
         tets.push(corners);
-        reader.word();
+        reader.skip_words(nodes - 4 + 1);
     }
     Ok(tets)
 }
@@ -92,7 +106,8 @@ fn tetrahedra(reader: &mut Reader) -> Result<Vec<[u32; 4]>, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::tests::{octahedron, of_text, survive_mutations};
+    use crate::Note;
+    use crate::file::tests::{octahedron, of_bytes, of_text, survive_mutations};
 
     const TEXT: &str = "MeshVersionFormatted 1 # old\nDimension\n3\nVertices 4\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\nTriangles\n1\n1 2 3 7\n\
                         Tetrahedra\n1\n1 2 3 4 9\nEnd\n";
@@ -102,12 +117,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.mesh");
         write(&path, &octahedron()).unwrap();
-        assert_eq!(read(&path).unwrap(), octahedron());
+        assert_eq!(import(&path).unwrap().mesh, octahedron());
     }
 
     #[test]
     fn other_sections_are_left_out_and_faults_named() {
-        assert_eq!(of_text(TEXT, parse).unwrap().tets, [[0, 1, 2, 3]]);
+        let import = of_bytes(TEXT.as_bytes(), parse).unwrap();
+        assert_eq!((import.mesh.tets, import.notes), (vec![[0, 1, 2, 3]], vec![Note::Others(1)]));
+        let quadratic = TEXT
+            .replace("Vertices 4\n", "Vertices 5\n9 9 9 0\n")
+            .replace("Tetrahedra\n1\n1 2 3 4", "TetrahedraP2\n1\n2 3 4 5 1 1 1 1 1 1");
+        let quadratic = of_bytes(quadratic.as_bytes(), parse).unwrap();
+        assert_eq!(quadratic.notes, [Note::Corners(1), Note::Others(1), Note::Orphans(1)]);
+        assert_eq!(quadratic.mesh, of_text(TEXT, parse).unwrap());
         let fault = |from: &str, to: &str| of_text(&TEXT.replace(from, to), parse).unwrap_err().to_string();
         assert!(fault("\n3\n", "\n2\n").contains("Dimension is 2"));
         assert!(fault("Vertices 4", "Vertices 400000000").contains("count of Vertices"));

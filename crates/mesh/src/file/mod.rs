@@ -4,12 +4,18 @@
 //! A file is read as a whole. A count in a header is compared with the remaining bytes before
 //! allocation, so that a header cannot request more than a few times the file's size. A new file is
 //! written under a temporary name and then renamed.
+//!
+//! Every reader of tetrahedra ends in the same step: of elements with more nodes the corners stay,
+//! a tetrahedron that is listed again counts once, and nodes without a tetrahedron go. [`Note`] says
+//! so. STL, PLY, OBJ, VTK and VTU are written with `SPACE=RAS`, as 3D Slicer reads it; `SPACE=LPS`
+//! turns x and y. A file that says neither is taken as RAS, but by 3D Slicer as LPS.
 
 pub mod abaqus;
 mod format;
 pub mod gmsh;
 mod list;
 pub mod medit;
+mod note;
 mod numbered;
 pub mod obj;
 pub mod ply;
@@ -19,7 +25,11 @@ pub mod vtk;
 pub mod vtu;
 
 pub use format::Format;
-pub use list::{SURFACE_FORMATS, VOLUME_FORMATS, read, read_among, read_surface, write, write_among, write_surface};
+pub use list::{
+    SURFACE_FORMATS, VOLUME_FORMATS, import, import_among, import_surface, read, read_among, read_surface, write,
+    write_among, write_surface,
+};
+pub use note::{Import, Note};
 
 use crate::{MeshError, TetMesh, TriMesh};
 use std::fmt::Display;
@@ -68,6 +78,18 @@ pub(crate) struct Reader {
     at: usize,
     /// Character that starts a comment up to the end of the line.
     pub(crate) comment: Option<u8>,
+    /// Whether x and y point to the patient's left and back.
+    pub(crate) lps: bool,
+}
+
+/// The tetrahedra of a file, and how many of its elements are others.
+#[derive(Default)]
+pub(crate) struct Elements {
+    pub(crate) tets: Vec<[u32; 4]>,
+    /// Tetrahedra with more than four nodes.
+    pub(crate) of_more_nodes: usize,
+    /// Elements that are no tetrahedra.
+    pub(crate) others: usize,
 }
 
 impl Reader {
@@ -78,7 +100,7 @@ impl Reader {
 
     /// A reader of bytes in memory.
     pub(crate) fn of(path: &Path, bytes: Vec<u8>) -> Self {
-        Self { path: path.into(), bytes, at: 0, comment: None }
+        Self { path: path.into(), bytes, at: 0, comment: None, lps: false }
     }
 
     pub(crate) fn error(&self, field: impl Into<String>, got: impl Display, wanted: impl Into<String>) -> FileError {
@@ -124,15 +146,22 @@ impl Reader {
         }
     }
 
-    /// Skips words that are numbers.
-    pub(crate) fn skip_numbers(&mut self) {
+    /// Skips words that are numbers; returns the first of them.
+    pub(crate) fn skip_numbers(&mut self) -> Option<f64> {
+        let mut first = None;
         loop {
             let at = self.at;
-            if self.word().is_none_or(|word| word.parse::<f64>().is_err()) {
+            let Some(number) = self.word().and_then(|word| word.parse().ok()) else {
                 self.at = at;
-                return;
-            }
+                return first;
+            };
+            first = first.or(Some(number));
         }
+    }
+
+    /// Heeds `SPACE=LPS` in a comment.
+    pub(crate) fn heed_space(&mut self, comment: &str) {
+        self.lps |= comment.to_ascii_uppercase().contains("SPACE=LPS");
     }
 
     /// Skips up to `count` words.
@@ -230,26 +259,44 @@ impl Reader {
     }
 
     /// Builds the mesh, if it has tetrahedra and their indices are in range.
-    pub(crate) fn mesh(&self, positions: Vec<Vec3>, tets: Vec<[u32; 4]>) -> Result<TetMesh, FileError> {
-        let mesh = TetMesh { positions, tets };
+    pub(crate) fn mesh(&self, positions: Vec<Vec3>, elements: Elements) -> Result<Import<TetMesh>, FileError> {
+        let (nodes, listed) = (positions.len(), elements.tets.len());
+        let mesh = TetMesh { positions: self.in_ras(positions), tets: elements.tets };
         mesh.check_indices().map_err(|source| FileError::Mesh { path: self.path.clone(), source })?;
-        Ok(mesh)
+        let mesh = mesh.without_repeats().without_orphans();
+        let counts = [
+            (elements.of_more_nodes, Note::Corners as fn(usize) -> Note),
+            (elements.others, Note::Others),
+            (listed - mesh.tets.len(), Note::Repeated),
+            (nodes - mesh.positions.len(), Note::Orphans),
+        ];
+        let notes = counts.into_iter().filter(|(count, _)| *count > 0).map(|(count, note)| note(count));
+        Ok(Import { notes: notes.chain(self.lps.then_some(Note::Lps)).collect(), mesh })
     }
 
     /// Builds the surface, if it has triangles and their indices are in range.
-    pub(crate) fn surface(&self, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<TriMesh, FileError> {
+    pub(crate) fn surface(&self, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Import<TriMesh>, FileError> {
         if triangles.is_empty() {
             return Err(self.error("the file", "without a triangle", "a surface"));
         }
         let out_of_range = |t: &[u32; 3]| t.iter().any(|&n| n as usize >= positions.len());
-        match triangles.iter().position(out_of_range) {
-            None => Ok(TriMesh { positions, triangles }),
-            Some(t) => Err(self.error(
+        if let Some(t) = triangles.iter().position(out_of_range) {
+            return Err(self.error(
                 format!("triangle {t}"),
                 format!("{:?}", triangles[t]),
                 format!("of nodes 0 to {}", positions.len().saturating_sub(1)),
-            )),
+            ));
         }
+        let mesh = TriMesh { positions: self.in_ras(positions), triangles };
+        Ok(Import { mesh, notes: self.lps.then_some(Note::Lps).into_iter().collect() })
+    }
+
+    /// Turns LPS by half a turn about z, which keeps the order of corners right.
+    fn in_ras(&self, mut positions: Vec<Vec3>) -> Vec<Vec3> {
+        if self.lps {
+            positions.iter_mut().for_each(|p| *p *= Vec3::new(-1.0, -1.0, 1.0));
+        }
+        positions
     }
 }
 
@@ -304,9 +351,17 @@ pub(crate) mod tests {
         }
     }
 
-    /// Parses a text.
-    pub(crate) fn of_text<T>(text: &str, parse: impl Fn(Reader) -> Result<T, FileError>) -> Result<T, FileError> {
-        parse(Reader::of(Path::new("some.file"), text.as_bytes().to_vec()))
+    /// Parses a text; leaves the notes out.
+    pub(crate) fn of_text<M>(
+        text: &str,
+        parse: impl Fn(Reader) -> Result<Import<M>, FileError>,
+    ) -> Result<M, FileError> {
+        of_bytes(text.as_bytes(), parse).map(|import| import.mesh)
+    }
+
+    /// Parses bytes.
+    pub(crate) fn of_bytes<T>(bytes: &[u8], parse: impl Fn(Reader) -> Result<T, FileError>) -> Result<T, FileError> {
+        parse(Reader::of(Path::new("some.file"), bytes.to_vec()))
     }
 
     /// Number of damaged copies; more with TREPAN_MUTATIONS=1000000.

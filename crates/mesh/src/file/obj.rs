@@ -9,35 +9,38 @@
 //! Writes vertices and triangles with enough digits to restore each f32.
 
 use crate::TriMesh;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{FileError, Format, Import, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
 
 /// The format.
-pub const FORMAT: Format<TriMesh> = Format { name: "OBJ (.obj)", endings: &["obj"], starts: &[], read, write };
+pub const FORMAT: Format<TriMesh> = Format { name: "OBJ (.obj)", endings: &["obj"], starts: &[], import, write };
 
-/// Reads a surface.
-pub fn read(path: &Path) -> Result<TriMesh, FileError> {
+/// Reads a surface, with notes about the file.
+pub fn import(path: &Path) -> Result<Import<TriMesh>, FileError> {
     parse(Reader::open(path)?)
 }
 
 /// Writes a surface as OBJ, atomically.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
+        writeln!(out, "# SPACE=RAS")?;
         mesh.positions.iter().try_for_each(|p| writeln!(out, "v {} {} {}", p.x, p.y, p.z))?;
         mesh.triangles.iter().map(|t| t.map(|n| n + 1)).try_for_each(|[a, b, c]| writeln!(out, "f {a} {b} {c}"))
     })
 }
 
-pub(crate) fn parse(mut reader: Reader) -> Result<TriMesh, FileError> {
+pub(crate) fn parse(mut reader: Reader) -> Result<Import<TriMesh>, FileError> {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     while let Some(line) = reader.line() {
-        let mut words = line.split('#').next().unwrap_or_default().split_ascii_whitespace();
+        let (line, comment) = line.split_once('#').unwrap_or((&line, ""));
+        reader.heed_space(comment);
+        let mut words = line.split_ascii_whitespace();
         match words.next() {
             Some("v") => positions.push(vertex(&reader, positions.len(), words)?),
             Some("f") => {
                 let corners =
-                    words.map(|w| corner(&reader, &line, w, positions.len())).collect::<Result<Vec<u32>, _>>()?;
+                    words.map(|w| corner(&reader, line, w, positions.len())).collect::<Result<Vec<u32>, _>>()?;
                 if corners.len() < 3 {
                     return Err(reader.error("a face", line, "at least three vertices"));
                 }
@@ -81,7 +84,7 @@ mod tests {
         let mesh = octahedron();
         let surface = Surface::of(&mesh).to_tri_mesh(&mesh.positions);
         write(&path, &surface).unwrap();
-        assert_eq!(read(&path).unwrap(), surface);
+        assert_eq!(import(&path).unwrap().mesh, surface);
     }
 
     #[test]

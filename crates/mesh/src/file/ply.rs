@@ -13,21 +13,25 @@
 //! G. Turk, "The PLY Polygon File Format", 1994.
 
 use crate::TriMesh;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{FileError, Format, Import, Reader, write_atomically};
 use std::path::Path;
 
 /// The format.
-pub const FORMAT: Format<TriMesh> = Format { name: "PLY (.ply)", endings: &["ply"], starts: &[], read, write };
+pub const FORMAT: Format<TriMesh> = Format { name: "PLY (.ply)", endings: &["ply"], starts: &[], import, write };
 
-/// Reads a surface.
-pub fn read(path: &Path) -> Result<TriMesh, FileError> {
+/// Reads a surface, with notes about the file.
+pub fn import(path: &Path) -> Result<Import<TriMesh>, FileError> {
     parse(Reader::open(path)?)
 }
 
 /// Writes a surface as binary PLY, atomically.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.positions.len())?;
+        writeln!(
+            out,
+            "ply\nformat binary_little_endian 1.0\ncomment SPACE=RAS\nelement vertex {}",
+            mesh.positions.len()
+        )?;
         writeln!(out, "property float x\nproperty float y\nproperty float z")?;
         writeln!(out, "element face {}", mesh.triangles.len())?;
         writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
@@ -40,7 +44,7 @@ pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     })
 }
 
-pub(crate) fn parse(reader: Reader) -> Result<TriMesh, FileError> {
+pub(crate) fn parse(reader: Reader) -> Result<Import<TriMesh>, FileError> {
     let mut file = Ply { reader, encoding: Encoding::Text };
     let elements = file.header()?;
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
@@ -139,6 +143,7 @@ impl Ply {
                 return Err(self.reader.error("the header", "cut off", "ended by end_header; copy the file again"));
             };
             match line.split_ascii_whitespace().collect::<Vec<_>>()[..] {
+                ["comment", ..] => self.reader.heed_space(&line),
                 ["format", name, _] => self.encoding = self.encoding(name)?,
                 ["element", name, count] => {
                     let wrong = || self.reader.error(format!("the count of {name}"), count, "a whole number");
@@ -247,7 +252,7 @@ impl Ply {
 mod tests {
     use super::*;
     use crate::Surface;
-    use crate::file::tests::{octahedron, of_text, survive_mutations};
+    use crate::file::tests::{octahedron, of_bytes, of_text, survive_mutations};
 
     const TEXT: &str = "ply\r\nformat ascii 1.0\r\ncomment a square\r\nelement vertex 4\r\nproperty float x\r\nproperty float y\r\nproperty uchar red\r\nproperty float z\r\nelement face 1\r\nproperty list uchar int vertex_indices\r\nproperty uchar red\r\nelement edge 1\r\nproperty int vertex1\r\nend_header\r\n0 0 9 0\r\n1 0 9 0\r\n1 1 9 0\r\n0 1 9 0.5\r\n4 0 1 2 3 7\r\n5\r\n";
 
@@ -268,7 +273,7 @@ mod tests {
         let mesh = octahedron();
         let surface = Surface::of(&mesh).to_tri_mesh(&mesh.positions);
         write(&path, &surface).unwrap();
-        assert_eq!(read(&path).unwrap(), surface);
+        assert_eq!(import(&path).unwrap().mesh, surface);
         survive_mutations(&std::fs::read(&path).unwrap(), parse);
     }
 
@@ -277,7 +282,7 @@ mod tests {
         let square = of_text(TEXT, parse).unwrap();
         assert_eq!(square.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(square.positions[3].to_array(), [0.0, 1.0, 0.5]);
-        assert_eq!(parse(Reader::of(Path::new("big.ply"), big())).unwrap(), square);
+        assert_eq!(of_bytes(&big(), parse).unwrap().mesh, square);
         let fault = |from: &str, to: &str| of_text(&TEXT.replace(from, to), parse).unwrap_err().to_string();
         assert!(fault("4 0 1 2 3 7", "4 0 1 2 8 7").contains("triangle 1"));
         assert!(fault("4 0 1 2 3 7", "2 0 1 7").contains("at least three"));
@@ -306,7 +311,7 @@ mod tests {
             println!("{} is not there: not tried", path.display());
             return;
         }
-        let brain = read(&path).unwrap();
+        let brain = import(&path).unwrap().mesh;
         assert_eq!((brain.positions.len(), brain.triangles.len()), (10242, 20480));
         assert!(brain.is_closed() && brain.volume_mm3() > 9e5, "{} mm3", brain.volume_mm3());
     }

@@ -10,22 +10,22 @@
 //! defines them. Writes binary. Positions are mm; STL has no unit.
 
 use crate::TriMesh;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{FileError, Format, Import, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
 
 /// The format.
-pub const FORMAT: Format<TriMesh> = Format { name: "STL (.stl)", endings: &["stl"], starts: &[], read, write };
+pub const FORMAT: Format<TriMesh> = Format { name: "STL (.stl)", endings: &["stl"], starts: &[], import, write };
 
-/// Reads a surface.
-pub fn read(path: &Path) -> Result<TriMesh, FileError> {
+/// Reads a surface, with notes about the file.
+pub fn import(path: &Path) -> Result<Import<TriMesh>, FileError> {
     parse(Reader::open(path)?)
 }
 
 /// Writes a surface as binary STL, atomically.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
-        out.write_all(&[b' '; 80])?;
+        write!(out, "{:80}", "SPACE=RAS")?;
         out.write_all(&(mesh.triangles.len() as u32).to_le_bytes())?;
         for triangle in 0..mesh.triangles.len() {
             let [a, b, c] = mesh.corners(triangle);
@@ -37,18 +37,22 @@ pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     })
 }
 
-pub(crate) fn parse(mut reader: Reader) -> Result<TriMesh, FileError> {
+pub(crate) fn parse(mut reader: Reader) -> Result<Import<TriMesh>, FileError> {
     let size = reader.size();
     let header: [u8; 84] = if size >= 84 { reader.array("the header")? } else { [0; 84] };
     let count = u32::from_le_bytes([header[80], header[81], header[82], header[83]]) as usize;
     let corners = if size >= 84 && count.checked_mul(50) == Some(size - 84) {
+        reader.heed_space(&String::from_utf8_lossy(&header));
         binary(&mut reader, count)?
     } else {
+        reader.rewind();
+        let title = reader.line().unwrap_or_default();
+        reader.heed_space(&title);
         reader.rewind();
         text(&mut reader)?
     };
     let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    reader.surface(corners, triangles).map(|soup| soup.welded())
+    reader.surface(corners, triangles).map(|soup| Import { mesh: soup.mesh.welded(), ..soup })
 }
 
 fn binary(reader: &mut Reader, count: usize) -> Result<Vec<Vec3>, FileError> {
@@ -68,7 +72,7 @@ fn binary(reader: &mut Reader, count: usize) -> Result<Vec<Vec3>, FileError> {
 
 fn text(reader: &mut Reader) -> Result<Vec<Vec3>, FileError> {
     let first = reader.word().unwrap_or_default().to_owned();
-    if first != "solid" {
+    if !first.eq_ignore_ascii_case("solid") {
         return Err(reader.error(
             "the file",
             format!("{} bytes that start with {first:?}", reader.size()),
@@ -77,7 +81,7 @@ fn text(reader: &mut Reader) -> Result<Vec<Vec3>, FileError> {
     }
     let mut corners = Vec::new();
     while let Some(word) = reader.word() {
-        if word == "vertex" {
+        if word.eq_ignore_ascii_case("vertex") {
             corners.push(reader.xyz(corners.len())?);
         }
     }
@@ -106,7 +110,7 @@ mod tests {
         let mesh = octahedron();
         let surface = Surface::of(&mesh).to_tri_mesh(&mesh.positions);
         write(&path, &surface).unwrap();
-        let back = read(&path).unwrap();
+        let back = import(&path).unwrap().mesh;
         assert!(back.is_closed());
         assert!((back.volume_mm3() - mesh.total_mm3()).abs() < 1e-6);
         survive_mutations(&std::fs::read(&path).unwrap(), parse);

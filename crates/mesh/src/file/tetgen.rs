@@ -16,15 +16,15 @@
 
 use crate::TetMesh;
 use crate::file::numbered::Numbered;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{Elements, FileError, Format, Import, Reader, write_atomically};
 use std::path::Path;
 
 /// The format.
 pub const FORMAT: Format<TetMesh> =
-    Format { name: "TetGen (.node, .ele)", endings: &["node", "ele"], starts: &[], read, write };
+    Format { name: "TetGen (.node, .ele)", endings: &["node", "ele"], starts: &[], import, write };
 
 /// Reads a pair of TetGen files. Only indices are checked; call [`TetMesh::check`] for the rest.
-pub fn read(path: &Path) -> Result<TetMesh, FileError> {
+pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
     parse(Reader::open(&path.with_extension("node"))?, Reader::open(&path.with_extension("ele"))?)
 }
 
@@ -41,7 +41,7 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     })
 }
 
-fn parse(mut nodes: Reader, mut elements: Reader) -> Result<TetMesh, FileError> {
+fn parse(mut nodes: Reader, mut elements: Reader) -> Result<Import<TetMesh>, FileError> {
     let numbered = parse_nodes(&mut nodes)?;
     elements.comment = Some(b'#');
     let count = elements.count("the count of elements", 10)?;
@@ -59,7 +59,9 @@ fn parse(mut nodes: Reader, mut elements: Reader) -> Result<TetMesh, FileError> 
         tets.push(numbered.corners(&elements, tet, [a, b, c, d])?);
         elements.skip_words((corners - 4).saturating_add(attributes));
     }
-    elements.mesh(numbered.positions, tets).map(turned)
+    let of_more_nodes = if corners > 4 { count } else { 0 };
+    let import = elements.mesh(numbered.positions, Elements { tets, of_more_nodes, ..Elements::default() })?;
+    Ok(Import { mesh: turned(import.mesh), ..import })
 }
 
 /// Swaps the corner order if all volumes are negative.
@@ -91,12 +93,17 @@ fn parse_nodes(reader: &mut Reader) -> Result<Numbered, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Note;
     use crate::file::tests::{octahedron, survive_mutations};
 
     const NODES: &str = "# four\n4 3 1 1\n0 0 0 0 5.5 1\n1 1 0 0 5.5 1\n2 0 1 0 5.5 1\n3 0 0 1 5.5 1 # last\n";
     const ELEMENTS: &str = "1 4 1\n0 0 1 2 3 77\n";
 
     fn parsed(nodes: &str, elements: &str) -> Result<TetMesh, FileError> {
+        imported(nodes, elements).map(|import| import.mesh)
+    }
+
+    fn imported(nodes: &str, elements: &str) -> Result<Import<TetMesh>, FileError> {
         let reader = |name: &str, text: &str| Reader::of(Path::new(name), text.as_bytes().to_vec());
         parse(reader("a.node", nodes), reader("a.ele", elements))
     }
@@ -106,8 +113,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.ele");
         write(&path, &octahedron()).unwrap();
-        assert_eq!(read(&path).unwrap(), octahedron());
-        assert_eq!(read(&path.with_extension("node")).unwrap(), octahedron());
+        assert_eq!(import(&path).unwrap().mesh, octahedron());
+        assert_eq!(import(&path.with_extension("node")).unwrap().mesh, octahedron());
     }
 
     #[test]
@@ -122,6 +129,14 @@ mod tests {
         assert!(fault(NODES, "99999999 4 0\n0 1 0 2 3\n").contains("count of elements"));
         assert!(fault(NODES, "1 8 0\n0 1 0 2 3 4 5 6 7\n").contains("corners of an element"));
         assert!(fault("", ELEMENTS).contains("end of the file"));
+    }
+
+    #[test]
+    fn edge_nodes_are_dropped() {
+        let nodes = NODES.replace("4 3 1", "5 3 1") + "4 0.5 0 0 5.5 1\n";
+        let quadratic = imported(&nodes, "1 10 0\n0 0 1 2 3 4 4 4 4 4 4\n").unwrap();
+        assert_eq!(quadratic.mesh.check(), Ok(()));
+        assert_eq!(quadratic.notes, [Note::Corners(1), Note::Orphans(1)]);
     }
 
     #[test]

@@ -1,20 +1,22 @@
 //! Legacy VTK files (`.vtk`) of tetrahedra.
 //!
 //! # Theory
-//! Four header lines, then `POINTS`, `CELLS` and `CELL_TYPES` of an unstructured grid, as text or
-//! as big-endian binary. Up to version 4 a cell is a count and its nodes in one list; version 5
-//! splits that into `OFFSETS` and `CONNECTIVITY`. Cell type 10 is the 4-node tetrahedron.
+//! A version, a title and an encoding, then `POINTS`, `CELLS` and `CELL_TYPES` of an unstructured
+//! grid, as text or as big-endian binary. Up to version 4 a cell is a count and its nodes in one
+//! list; version 5 splits that into `OFFSETS` and `CONNECTIVITY`. Cell type 10 is the 4-node
+//! tetrahedron, 24 the 10-node one, 71 and 78 those of any order.
 //!
 //! # Practice
-//! Reads both encodings and both layouts; skips cells of other types, point and cell data. Writes
-//! version 3.0, binary, f32, which every version of VTK reads. Positions are mm; VTK has no unit.
-//! The corner order is the same as in [`TetMesh`].
+//! Reads both encodings and both layouts, keywords in any case; skips cells of other types, point
+//! and cell data, and `FIELD` and `METADATA` wherever they stand. Of tetrahedra with more nodes the
+//! corners are read. Writes version 3.0, binary, f32, which every version of VTK reads. Positions
+//! are mm; VTK has no unit. The corner order is the same as in [`TetMesh`].
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{Elements, FileError, Format, Import, Reader, write_atomically};
 use crate::lattice::LabelledMesh;
 use std::io::Write;
 use std::path::Path;
@@ -24,11 +26,11 @@ const TETRAHEDRON: u8 = 10;
 
 /// The format.
 pub const FORMAT: Format<TetMesh> =
-    Format { name: "legacy VTK (.vtk)", endings: &["vtk"], starts: &["# vtk DataFile"], read, write };
+    Format { name: "legacy VTK (.vtk)", endings: &["vtk"], starts: &["# vtk DataFile"], import, write };
 
 /// Reads the tetrahedra of a legacy VTK file. Only indices are checked; call [`TetMesh::check`] for
 /// the rest.
-pub fn read(path: &Path) -> Result<TetMesh, FileError> {
+pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
     parse(Reader::open(path)?)
 }
 
@@ -37,12 +39,12 @@ pub fn read(path: &Path) -> Result<TetMesh, FileError> {
 pub fn read_labelled(path: &Path) -> Result<LabelledMesh, FileError> {
     let mut file = Legacy { reader: Reader::open(path)?, binary: false, offsets: false };
     file.header()?;
-    let mesh = file.body()?;
+    let mesh = file.body()?.mesh;
     let label_of_tet = file.labels(mesh.tets.len())?;
     Ok(LabelledMesh { mesh, label_of_tet, ..LabelledMesh::default() })
 }
 
-pub(crate) fn parse(reader: Reader) -> Result<TetMesh, FileError> {
+pub(crate) fn parse(reader: Reader) -> Result<Import<TetMesh>, FileError> {
     let mut file = Legacy { reader, binary: false, offsets: false };
     file.header()?;
     file.body()
@@ -66,7 +68,7 @@ pub fn write_labelled(path: &Path, labelled: &LabelledMesh) -> Result<(), FileEr
 
 fn write_grid(out: &mut dyn Write, mesh: &TetMesh) -> std::io::Result<()> {
     let count = mesh.tets.len();
-    write!(out, "# vtk DataFile Version 3.0\ntetrahedra, mm\nBINARY\nDATASET UNSTRUCTURED_GRID\n")?;
+    write!(out, "# vtk DataFile Version 3.0\ntetrahedra, mm, SPACE=RAS\nBINARY\nDATASET UNSTRUCTURED_GRID\n")?;
     writeln!(out, "POINTS {} float", mesh.positions.len())?;
     mesh.positions.iter().flat_map(Vec3::to_array).try_for_each(|c| out.write_all(&c.to_be_bytes()))?;
     writeln!(out, "\nCELLS {count} {}", 5 * count)?;
@@ -100,31 +102,32 @@ impl Legacy {
         };
         let major: f32 = version.trim().parse().map_err(|_| self.reader.error("the version", version, "a number"))?;
         self.offsets = major >= 5.0;
-        self.reader.line();
-        let encoding = self.reader.line().unwrap_or_default();
-        self.binary = match encoding.trim() {
-            "BINARY" => true,
-            "ASCII" => false,
+        let title = self.reader.line().unwrap_or_default();
+        self.reader.heed_space(&title);
+        self.binary = match self.keyword().as_str() {
+            "binary" => true,
+            "ascii" => false,
             other => return Err(self.reader.error("the encoding", other, "ASCII or BINARY")),
         };
-        let dataset = self.reader.line().unwrap_or_default();
-        let is_grid = dataset.split_ascii_whitespace().eq(["DATASET", "UNSTRUCTURED_GRID"]);
-        if is_grid {
-            Ok(())
-        } else {
-            Err(self.reader.error("the data set", dataset, "DATASET UNSTRUCTURED_GRID; convert it to tetrahedra"))
-        }
+        Ok(())
     }
 
-    fn body(&mut self) -> Result<TetMesh, FileError> {
+    /// The next word in lower case.
+    fn keyword(&mut self) -> String {
+        self.reader.word().unwrap_or_default().to_ascii_lowercase()
+    }
+
+    fn body(&mut self) -> Result<Import<TetMesh>, FileError> {
         let (mut positions, mut cells, mut types) = (None, None, None);
         while positions.is_none() || cells.is_none() || types.is_none() {
-            match self.reader.word().unwrap_or_default().to_owned().as_str() {
-                "POINTS" => positions = Some(self.points()?),
-                "CELLS" if self.offsets => cells = Some(self.split_cells()?),
-                "CELLS" => cells = Some(self.mixed_cells()?),
-                "CELL_TYPES" => types = Some(self.types()?),
-                "METADATA" => self.skip_metadata(),
+            match self.keyword().as_str() {
+                "dataset" => self.data_set()?,
+                "points" => positions = Some(self.points()?),
+                "cells" if self.offsets => cells = Some(self.split_cells()?),
+                "cells" => cells = Some(self.mixed_cells()?),
+                "cell_types" => types = Some(self.types()?),
+                "metadata" => self.skip_metadata(),
+                "field" => self.skip_field()?,
                 other => {
                     return Err(self.reader.error(
                         "the next section",
@@ -134,8 +137,16 @@ impl Legacy {
                 }
             }
         }
-        let tets = self.tets(&cells.unwrap_or_default(), &types.unwrap_or_default())?;
-        self.reader.mesh(positions.unwrap_or_default(), tets)
+        let cells = cells.unwrap_or_default();
+        let elements = elements(&self.reader, &cells.starts, &cells.nodes, &types.unwrap_or_default())?;
+        self.reader.mesh(positions.unwrap_or_default(), elements)
+    }
+
+    fn data_set(&mut self) -> Result<(), FileError> {
+        match self.keyword().as_str() {
+            "unstructured_grid" => Ok(()),
+            other => Err(self.reader.error("the data set", other, "UNSTRUCTURED_GRID; convert it to tetrahedra")),
+        }
     }
 
     /// One label for each cell.
@@ -156,30 +167,94 @@ impl Legacy {
         while self.reader.line().is_some_and(|line| !line.trim().is_empty()) {}
     }
 
+    /// Skips named arrays. Strings are a line each in text, and a length and bytes in binary.
+    fn skip_field(&mut self) -> Result<(), FileError> {
+        let field = "an array of FIELD";
+        self.reader.word();
+        let arrays: usize = self.reader.number("the count of FIELD", "a count")?;
+        for _ in 0..arrays {
+            let mut name = self.keyword();
+            while name == "metadata" {
+                self.skip_metadata();
+                name = self.keyword();
+            }
+            if name == "null_array" {
+                continue;
+            }
+            let components: usize = self.reader.number(field, "a count of components")?;
+            let tuples: usize = self.reader.number(field, "a count of tuples")?;
+            let count = components.saturating_mul(tuples);
+            match self.keyword().as_str() {
+                "string" if self.binary => {
+                    self.reader.line();
+                    (0..count).try_for_each(|_| self.skip_string())?;
+                }
+                "string" | "variant" => {
+                    (0..=count).try_for_each(|_| self.reader.line().map(drop));
+                }
+                kind if self.binary => {
+                    let bytes = match kind {
+                        "bit" => count.div_ceil(8),
+                        kind => count.saturating_mul(self.number_type(field, kind)?.0),
+                    };
+                    self.reader.line();
+                    self.reader.take(field, bytes)?;
+                }
+                _ => self.reader.skip_words(count),
+            }
+        }
+        Ok(())
+    }
+
+    /// Skips a string, whose length has a size in the two highest bits of its first byte.
+    fn skip_string(&mut self) -> Result<(), FileError> {
+        let field = "a string of FIELD";
+        let first = self.reader.array::<1>(field)?[0];
+        let more = [7, 3, 1, 0][usize::from(first >> 6)];
+        let more = self.reader.take(field, more)?;
+        let length = more.iter().fold(u64::from(first & 63), |length, &byte| length << 8 | u64::from(byte));
+        self.reader.take(field, usize::try_from(length).unwrap_or(usize::MAX)).map(drop)
+    }
+
     fn points(&mut self) -> Result<Vec<Vec3>, FileError> {
-        let count = self.reader.count("the count of POINTS", 6)?;
-        let kind = self.reader.word().unwrap_or_default().to_owned();
+        let count = self.reader.count("the count of POINTS", 3)?;
+        let kind = self.keyword();
         let values = self.numbers("POINTS", 3 * count, &kind)?;
         values.as_chunks::<3>().0.iter().enumerate().map(|(n, &xyz)| self.reader.position(n, xyz)).collect()
     }
 
-    /// Reads numbers of a VTK type in the file's encoding.
-    fn numbers(&mut self, field: &str, count: usize, kind: &str) -> Result<Vec<f64>, FileError> {
-        let (size, of): (usize, fn(&[u8]) -> f64) = match kind {
-            "unsigned_short" => (2, |b| u16::from_be_bytes(b.try_into().unwrap_or_default()).into()),
+    /// Size of a VTK type and its conversion from big-endian bytes. `vtkIdType` is written as int.
+    fn number_type(&self, field: &str, kind: &str) -> Result<(usize, fn(&[u8]) -> f64), FileError> {
+        Ok(match kind {
+            "char" | "signed_char" | "vtktypeint8" => (1, |b| f64::from(b[0] as i8)),
+            "unsigned_char" | "vtktypeuint8" => (1, |b| b[0].into()),
+            "short" | "vtktypeint16" => (2, |b| i16::from_be_bytes(b.try_into().unwrap_or_default()).into()),
+            "unsigned_short" | "vtktypeuint16" => (2, |b| u16::from_be_bytes(b.try_into().unwrap_or_default()).into()),
             "float" => (4, |b| f32::from_be_bytes(b.try_into().unwrap_or_default()).into()),
             "double" => (8, |b| f64::from_be_bytes(b.try_into().unwrap_or_default())),
-            "int" => (4, |b| i32::from_be_bytes(b.try_into().unwrap_or_default()).into()),
-            "vtktypeint32" | "unsigned_int" => (4, |b| u32::from_be_bytes(b.try_into().unwrap_or_default()).into()),
-            "vtktypeint64" | "long" => (8, |b| i64::from_be_bytes(b.try_into().unwrap_or_default()) as f64),
+            "int" | "vtkidtype" | "vtktypeint32" => {
+                (4, |b| i32::from_be_bytes(b.try_into().unwrap_or_default()).into())
+            }
+            "unsigned_int" | "vtktypeuint32" => (4, |b| u32::from_be_bytes(b.try_into().unwrap_or_default()).into()),
+            "long" | "long_long" | "vtktypeint64" => {
+                (8, |b| i64::from_be_bytes(b.try_into().unwrap_or_default()) as f64)
+            }
+            "unsigned_long" | "unsigned_long_long" | "vtktypeuint64" => {
+                (8, |b| u64::from_be_bytes(b.try_into().unwrap_or_default()) as f64)
+            }
             other => {
                 return Err(self.reader.error(
                     format!("the type of {field}"),
                     other,
-                    "float, double, int, vtktypeint32 or vtktypeint64",
+                    "float, double, int or another of VTK",
                 ));
             }
-        };
+        })
+    }
+
+    /// Reads numbers of a VTK type in the file's encoding.
+    fn numbers(&mut self, field: &str, count: usize, kind: &str) -> Result<Vec<f64>, FileError> {
+        let (size, of) = self.number_type(field, kind)?;
         if self.binary {
             self.reader.line();
             let bytes = self.reader.take(field, count.saturating_mul(size))?;
@@ -221,11 +296,11 @@ impl Legacy {
     }
 
     fn named(&mut self, name: &str, count: usize) -> Result<Vec<f64>, FileError> {
-        let word = self.reader.word().unwrap_or_default().to_owned();
-        if word != name {
+        let word = self.keyword();
+        if !word.eq_ignore_ascii_case(name) {
             return Err(self.reader.error("a part of CELLS", word, name));
         }
-        let kind = self.reader.word().unwrap_or_default().to_owned();
+        let kind = self.keyword();
         self.numbers(name, count, &kind)
     }
 
@@ -233,28 +308,41 @@ impl Legacy {
         let count = self.reader.count("the count of CELL_TYPES", 2)?;
         Ok(self.numbers("CELL_TYPES", count, "int")?.into_iter().map(|t| t as u8).collect())
     }
+}
 
-    fn tets(&self, cells: &Cells, types: &[u8]) -> Result<Vec<[u32; 4]>, FileError> {
-        if cells.starts.len() != types.len() + 1 {
-            let got = format!("{} for {} cells", types.len(), cells.starts.len().saturating_sub(1));
-            return Err(self.reader.error("the count of CELL_TYPES", got, "one for each cell"));
-        }
-        let mut tets = Vec::new();
-        for (cell, _) in types.iter().enumerate().filter(|(_, t)| **t == TETRAHEDRON) {
-            let nodes = &cells.nodes[cells.starts[cell]..cells.starts[cell + 1]];
-            let corners = <[i64; 4]>::try_from(nodes).ok().map(|n| n.map(|n| u32::try_from(n).unwrap_or(u32::MAX)));
-            tets.push(corners.ok_or_else(|| {
-                self.reader.error(format!("tetrahedron {cell}"), format!("{} nodes", nodes.len()), "4 nodes")
-            })?);
-        }
-        Ok(tets)
+/// Sorts the cells of a grid by type; cell c has the nodes `starts[c]..starts[c + 1]`.
+pub(crate) fn elements(reader: &Reader, starts: &[usize], nodes: &[i64], types: &[u8]) -> Result<Elements, FileError> {
+    if starts.len() != types.len() + 1 {
+        let got = format!("{} for {} cells", types.len(), starts.len().saturating_sub(1));
+        return Err(reader.error("the count of cell types", got, "one for each cell"));
     }
+    let mut elements = Elements::default();
+    for (cell, &kind) in types.iter().enumerate() {
+        let wanted = match kind {
+            TETRAHEDRON => 4..=4,
+            24 => 10..=10,
+            71 | 78 => 4..=usize::MAX,
+            _ => {
+                elements.others += 1;
+                continue;
+            }
+        };
+        let nodes = nodes.get(starts[cell]..starts[cell + 1]).unwrap_or_default();
+        let Some(&corners) = nodes.first_chunk::<4>().filter(|_| wanted.contains(&nodes.len())) else {
+            let wanted = format!("{} nodes, as its type {kind} has", wanted.start());
+            return Err(reader.error(format!("tetrahedron {cell}"), format!("{} nodes", nodes.len()), wanted));
+        };
+        elements.tets.push(corners.map(|n| u32::try_from(n).unwrap_or(u32::MAX)));
+        elements.of_more_nodes += usize::from(nodes.len() > 4);
+    }
+    Ok(elements)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::tests::{octahedron, of_text, survive_mutations};
+    use crate::Note;
+    use crate::file::tests::{octahedron, of_bytes, of_text, survive_mutations};
 
     fn text(cells: &str) -> String {
         let points = "0 0 0 1 0 0 0 1 0 0 0 1 0.5 0.5 0.5";
@@ -271,9 +359,73 @@ mod tests {
         write_labelled(&path, &labelled).unwrap();
         let back = read_labelled(&path).unwrap();
         assert_eq!((&back.mesh, &back.label_of_tet), (&labelled.mesh, &labelled.label_of_tet));
-        assert_eq!(read(&path).unwrap(), labelled.mesh);
+        assert_eq!(import(&path).unwrap().mesh, labelled.mesh);
         write(&path, &labelled.mesh).unwrap();
         assert!(read_labelled(&path).unwrap_err().to_string().contains("CELL_DATA"));
+    }
+
+    /// Fields with every kind of array that is stored in its own way, and the blocks around them.
+    fn fields(binary: bool) -> Vec<u8> {
+        let mut bytes = b"FIELD FieldData 6\n".to_vec();
+        let arrays: [(&str, &str, &[u8]); 5] = [
+            ("TIME 1 1 double", "1.5", &[0; 8]),
+            ("two%20words 2 3 vtkIdType", "1 2 3\n4 5 6 ", b"POINTS 9 float\n12345678"),
+            ("flags 1 9 bit", "1 0 1 0 1 0 1 0 1 ", b"\n\n"),
+            ("text 1 2 string", "POINTS 5 float\n", b"\xc5abcde\x80\x01x"),
+            ("none 3 0 float", "", b""),
+        ];
+        for (at, (head, text, raw)) in arrays.into_iter().enumerate() {
+            bytes.extend([head.as_bytes(), b"\n", if binary { raw } else { text.as_bytes() }, b"\n"].concat());
+            bytes.extend(if at == 1 { &b"METADATA\nINFORMATION 1\nNAME x LOCATION y\nPOINTS\n\n"[..] } else { b"" });
+        }
+        bytes.extend(b"NULL_ARRAY\nMETADATA\nCOMPONENT_NAMES\nPOINTS\n\n");
+        bytes
+    }
+
+    #[test]
+    fn fields_are_skipped_wherever_they_stand() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.vtk");
+        write(&path, &octahedron()).unwrap();
+        let binary = std::fs::read(&path).unwrap();
+        let cells = "CELLS 2 9\n3 0 1 2\n4 0 1 2 3\nCELL_TYPES 2\n5\n10\n";
+        let plain = read_text(&text(cells)).unwrap();
+        for (good, mesh) in [(text(cells).into_bytes(), plain), (binary, octahedron())] {
+            let fields = fields(good != text(cells).into_bytes());
+            for before in ["DATASET", "POINTS", "CELLS", "CELL_TYPES"] {
+                let at = good.windows(before.len()).position(|w| w == before.as_bytes()).unwrap();
+                let bytes = [&good[..at], &fields, &good[at..]].concat();
+                assert_eq!(of_bytes(&bytes, parse).unwrap().mesh, mesh, "before {before}");
+                survive_mutations(&bytes, parse);
+            }
+            let data = [&good[..], b"POINT_DATA 6\n", &fields, b"CELL_DATA 4\n", &fields].concat();
+            assert_eq!(of_bytes(&data, parse).unwrap().mesh, mesh);
+        }
+        let cut = text("FIELD f 1\nx 1 5 double\n0 0 0");
+        assert!(read_text(&cut).is_err() && read_text(&cut.replace("ASCII", "BINARY")).is_err());
+    }
+
+    #[test]
+    fn keywords_may_have_any_case_and_blank_lines_around_them() {
+        let mixed = text("CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n");
+        let split = "CELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n";
+        for text in [&mixed, &text(split).replace("4.2", "5.1")] {
+            let (version, rest) = text.split_once('\n').unwrap();
+            let loose = rest.to_ascii_lowercase().replace("ascii", "\nascii\n\n").replace("points", "\n\npoints");
+            assert_eq!(read_text(&format!("{version}\n{loose}")).unwrap(), read_text(text).unwrap());
+        }
+    }
+
+    #[test]
+    fn of_tetrahedra_with_more_nodes_the_corners_are_read() {
+        let points = text("").replace("POINTS 5", "POINTS 10").replace("0.5 0.5 0.5", &"2 ".repeat(18));
+        for (kind, nodes) in [(24, 10), (71, 10), (78, 10)] {
+            let list = (0..nodes).map(|n| n.to_string()).collect::<Vec<_>>().join(" ");
+            let cells = format!("CELLS 2 16\n{nodes} {list}\n4 0 1 2 4\nCELL_TYPES 2\n{kind} 10\n");
+            let import = of_bytes((points.clone() + &cells).as_bytes(), parse).unwrap();
+            assert_eq!(import.mesh.tets, [[0, 1, 2, 3], [0, 1, 2, 4]]);
+            assert_eq!(import.notes, [Note::Corners(1), Note::Orphans(5)]);
+        }
     }
 
     fn read_text(text: &str) -> Result<TetMesh, FileError> {
@@ -285,7 +437,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.vtk");
         write(&path, &octahedron()).unwrap();
-        assert_eq!(read(&path).unwrap(), octahedron());
+        assert_eq!(import(&path).unwrap().mesh, octahedron());
     }
 
     #[test]
@@ -294,7 +446,7 @@ mod tests {
         let path = folder.path().join("labelled.vtk");
         let labelled = LabelledMesh { mesh: octahedron(), label_of_tet: vec![7, 258, 7, 7], ..LabelledMesh::default() };
         write_labelled(&path, &labelled).unwrap();
-        assert_eq!(read(&path).unwrap(), labelled.mesh);
+        assert_eq!(import(&path).unwrap().mesh, labelled.mesh);
         let tail = b"LOOKUP_TABLE default\n\x00\x07\x01\x02\x00\x07\x00\x07\n";
         assert!(std::fs::read(&path).unwrap().ends_with(tail));
     }

@@ -2,7 +2,7 @@
 //!
 //! # Theory
 //! An `UnstructuredGrid` with one `Piece`: `Points`, and `Cells` as `connectivity`, `offsets` and
-//! `types` (10 is the 4-node tetrahedron). A `DataArray` is text, base64 between its tags, or at an
+//! `types` (those of [`vtk`]). A `DataArray` is text, base64 between its tags, or at an
 //! offset in `AppendedData` (base64 or raw). Binary data start with their length; compressed data
 //! with the number of blocks, the size of a block and of the last one, and each block's compressed
 //! size.
@@ -17,31 +17,32 @@
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::file::{FileError, Format, Reader, write_atomically};
+use crate::file::{Elements, FileError, Format, Import, Reader, vtk, write_atomically};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use std::io::Read;
 use std::path::Path;
 use trepan_geometry::Vec3;
 
-const TETRAHEDRON: f64 = 10.0;
-
 /// The format.
 pub const FORMAT: Format<TetMesh> =
-    Format { name: "VTK XML (.vtu)", endings: &["vtu"], starts: &["<?xml", "<VTKFile"], read, write };
+    Format { name: "VTK XML (.vtu)", endings: &["vtu"], starts: &["<?xml", "<VTKFile"], import, write };
 
 /// Reads the tetrahedra of a VTK XML file. Only indices are checked; call [`TetMesh::check`] for
 /// the rest.
-pub fn read(path: &Path) -> Result<TetMesh, FileError> {
+pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
     parse(Reader::open(path)?)
 }
+
+/// Start of the text `RAS`, as 3D Slicer looks for it; letters are numbers, and 0 ends it.
+const SPACE: &str = "<DataArray type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">";
 
 /// Writes a mesh as VTK XML, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     let positions: Vec<u8> = mesh.positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
     let connectivity: Vec<u8> = mesh.tets.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
     let offsets: Vec<u8> = (1..=mesh.tets.len() as u64).flat_map(|n| (4 * n).to_le_bytes()).collect();
-    let types = vec![TETRAHEDRON as u8; mesh.tets.len()];
+    let types = vec![10; mesh.tets.len()];
     let inline = |bytes: &[u8]| BASE64.encode([&(bytes.len() as u64).to_le_bytes(), bytes].concat());
     write_atomically(path, |out| {
         let (nodes, cells) = (mesh.positions.len(), mesh.tets.len());
@@ -50,7 +51,8 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
             out,
             "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
         )?;
-        writeln!(out, "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<Points>")?;
+        writeln!(out, "<UnstructuredGrid>\n<FieldData>\n{SPACE}82 65 83 0</DataArray>\n</FieldData>")?;
+        writeln!(out, "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<Points>")?;
         writeln!(out, "<DataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\" format=\"binary\">")?;
         writeln!(out, "{}\n</DataArray>\n</Points>\n<Cells>", inline(&positions))?;
         for (name, kind, bytes) in
@@ -66,9 +68,12 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     })
 }
 
-pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
+pub(crate) fn parse(mut reader: Reader) -> Result<Import<TetMesh>, FileError> {
     let bytes = reader.take("the file", reader.size())?.to_vec();
-    Xml::new(&bytes, &reader)?.mesh()
+    let xml = Xml::new(&bytes, &reader)?;
+    let ((positions, elements), space) = (xml.grid()?, xml.space()?);
+    reader.heed_space(&format!("SPACE={space}"));
+    reader.mesh(positions, elements)
 }
 
 /// The file and the array format in its first tags.
@@ -141,7 +146,21 @@ impl<'a> Xml<'a> {
         Ok(Self { bytes, reader, big_endian, long_headers, zlib, appended: appended(bytes) })
     }
 
-    fn mesh(&self) -> Result<TetMesh, FileError> {
+    /// The field `SPACE`; empty without one.
+    fn space(&self) -> Result<String, FileError> {
+        let mut at = 0;
+        while let Some(tag) = Tag::next(self.bytes, at).filter(|tag| tag.name() != "AppendedData") {
+            if tag.name() == "DataArray" && tag.attribute("Name") == Some("SPACE") {
+                let letters = self.array(&tag, "SPACE")?;
+                return Ok(letters.into_iter().map(|letter| char::from(letter as u8)).take(8).collect());
+            }
+            at = tag.end;
+        }
+        Ok(String::new())
+    }
+
+    /// Positions and cells.
+    fn grid(&self) -> Result<(Vec<Vec3>, Elements), FileError> {
         let (mut points, mut connectivity, mut offsets, mut types) = (None, None, None, None);
         let (mut at, mut section, mut pieces) = (0, "", 0);
         while let Some(tag) = Tag::next(self.bytes, at) {
@@ -164,24 +183,11 @@ impl<'a> Xml<'a> {
         let points = points.ok_or_else(|| missing("Points"))?;
         let positions = points.as_chunks::<3>().0.iter().enumerate().map(|(n, &xyz)| self.reader.position(n, xyz));
         let (offsets, types) = (offsets.ok_or_else(|| missing("offsets"))?, types.ok_or_else(|| missing("types"))?);
-        let tets = self.tets(&connectivity.ok_or_else(|| missing("connectivity"))?, &offsets, &types)?;
-        self.reader.mesh(positions.collect::<Result<_, _>>()?, tets)
-    }
-
-    fn tets(&self, connectivity: &[f64], offsets: &[f64], types: &[f64]) -> Result<Vec<[u32; 4]>, FileError> {
-        if offsets.len() != types.len() {
-            let got = format!("{} for {} types", offsets.len(), types.len());
-            return Err(self.reader.error("the length of offsets", got, "one for each cell"));
-        }
-        let mut tets = Vec::new();
-        for (cell, _) in types.iter().enumerate().filter(|(_, t)| **t == TETRAHEDRON) {
-            let start = if cell == 0 { 0.0 } else { offsets[cell - 1] };
-            let nodes = connectivity.get(start as usize..offsets[cell] as usize).unwrap_or_default();
-            let corners = <[f64; 4]>::try_from(nodes).ok().map(|n| n.map(|n| n as u32));
-            let wanted = "4 nodes between its offsets";
-            tets.push(corners.ok_or_else(|| self.reader.error(format!("tetrahedron {cell}"), nodes.len(), wanted))?);
-        }
-        Ok(tets)
+        let starts: Vec<usize> = [0].into_iter().chain(offsets.into_iter().map(|end| end as usize)).collect();
+        let nodes = connectivity.ok_or_else(|| missing("connectivity"))?.into_iter().map(|n| n as i64);
+        let types: Vec<u8> = types.into_iter().map(|kind| kind as u8).collect();
+        let elements = vtk::elements(self.reader, &starts, &nodes.collect::<Vec<_>>(), &types)?;
+        Ok((positions.collect::<Result<_, _>>()?, elements))
     }
 
     /// Reads the numbers of an array.
@@ -284,7 +290,7 @@ fn number_type(kind: &str) -> Option<(usize, Meaning)> {
         "Float32" => (4, |b| f32::from_bits(u64::from_le_bytes(b) as u32).into()),
         "Float64" => (8, f64::from_le_bytes),
         "Int8" => (1, |b| f64::from(b[0] as i8)),
-        "UInt8" => (1, |b| b[0].into()),
+        "UInt8" | "String" => (1, |b| b[0].into()),
         "Int16" => (2, |b| f64::from(u64::from_le_bytes(b) as i16)),
         "UInt16" => (2, |b| f64::from(u64::from_le_bytes(b) as u16)),
         "Int32" => (4, |b| f64::from(u64::from_le_bytes(b) as i32)),
@@ -322,7 +328,8 @@ fn decoded(text: &[u8]) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::tests::{octahedron, of_text, survive_mutations};
+    use crate::Note;
+    use crate::file::tests::{octahedron, of_bytes, of_text, survive_mutations};
     use std::io::Write;
 
     #[test]
@@ -379,7 +386,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.vtu");
         write(&path, &octahedron()).unwrap();
-        assert_eq!(read(&path).unwrap(), octahedron());
+        assert_eq!(import(&path).unwrap().mesh, octahedron());
         survive_mutations(&std::fs::read(&path).unwrap(), parse);
     }
 
@@ -387,7 +394,15 @@ mod tests {
     fn text_and_appended_data_agree() {
         let text = of_text(TEXT, parse).unwrap();
         assert_eq!(text.tets, [[0, 1, 2, 3]]);
-        assert_eq!(parse(Reader::of(Path::new("appended"), appended_file())).unwrap(), text);
+        assert_eq!(of_bytes(&appended_file(), parse).unwrap().mesh, text);
+    }
+
+    #[test]
+    fn of_10_node_tetrahedra_the_corners_are_read_and_others_counted() {
+        let text = TEXT.replace("0 1 2 3<", "0 1 2 3 1 1 1 1 1 1<").replace("3 7<", "3 13<").replace("5 10<", "5 24<");
+        let import = of_bytes(text.as_bytes(), parse).unwrap();
+        assert_eq!(import.mesh, of_text(TEXT, parse).unwrap());
+        assert_eq!(import.notes, [Note::Corners(1), Note::Others(1)]);
     }
 
     #[test]
@@ -396,7 +411,7 @@ mod tests {
         assert!(fault("\"UnstructuredGrid\"", "\"PolyData\"").contains("type is PolyData"));
         assert!(fault("3 7<", "3 9<").contains("tetrahedron 1"));
         assert!(fault("0 1 2 3<", "0 1 2 4<").contains("names node 4"));
-        assert!(fault("5 10", "5").contains("length of offsets"));
+        assert!(fault("5 10", "5").contains("one for each cell"));
         assert!(fault("\"offsets\"", "\"off\"").contains("offsets is missing"));
         assert!(fault("0 0 0 1<", "0 0 0 z<").contains("a number of Points"));
         assert!(fault("byte_order", "compressor=\"vtkLZ4DataCompressor\" byte_order").contains("compressor"));
