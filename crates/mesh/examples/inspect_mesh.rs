@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("volume {:.3} ml, box {}", mesh.volume_mm3() / 1000.0, mesh.bounds().size());
         return Ok(());
     }
-    let mesh = trepan_mesh::read(path)?;
+    let trepan_mesh::Import { mesh, notes } = trepan_mesh::import(path)?;
+    notes.iter().for_each(|note| println!("note: {note}"));
     let quality = Quality::of(&mesh);
     println!("{} nodes, {} tetrahedra, {:.3} ml", mesh.positions.len(), mesh.tets.len(), quality.total_mm3 / 1000.0);
     println!("sound: {}", mesh.check().map_or_else(|e| e.to_string(), |()| "yes".into()));

@@ -200,12 +200,11 @@ impl Body {
             return Err(BodyError::FixedRange { node, nodes });
         }
         let mut held = self.fixed_mask();
-        self.anchors.iter().for_each(|anchor| held[anchor.node as usize] = true);
-        let is_free = !held.contains(&true);
-        match self.loose(held, |points| !points.is_empty()).filter(|_| !is_free) {
-            Some(tet) => Err(BodyError::Loose(tet)),
-            None => Ok(()),
-        }
+        let pulling = self.anchors.iter().filter(|anchor| anchor.along.max(anchor.across) > 0.0);
+        pulling.for_each(|anchor| held[anchor.node as usize] = true);
+        let is_held = held.contains(&true);
+        let loose = is_held.then(|| self.loose(held, |points| !points.is_empty())).flatten();
+        loose.map_or(Ok(()), |tet| Err(BodyError::Loose(tet)))
     }
 
     /// The first tetrahedron of a part, connected by faces, of which `held` nodes are not enough.
@@ -355,29 +354,21 @@ mod tests {
 
     #[test]
     fn every_part_must_be_held() {
-        let mut body = cube();
-        let count = body.mesh.positions.len() as u32;
-        let beside = |body: &mut Body, shift: Vec3| {
-            let copy: Vec<Vec3> = body.mesh.positions[..27].iter().map(|&p| p + shift).collect();
-            body.mesh.positions.extend(copy);
-            let tets: Vec<[u32; 4]> = body.mesh.tets.iter().map(|t| t.map(|n| n + count)).collect();
-            body.mesh.tets.extend(tets);
-            body.material_of_tet = vec![0; body.mesh.tets.len()];
+        // Two tetrahedra that share `shared` nodes, the second above the first.
+        let two = |shared: u32, fixed: &[u32]| {
+            let mut positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+            let above = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].into_iter().skip(shared as usize);
+            positions.extend(above.map(|p| p + Vec3::Z));
+            let tets = vec![[0, 1, 2, 3], [4, 5, 6, 7].map(|n| n - shared)];
+            Body::uniform(TetMesh { positions, tets }, fixed.to_vec(), Material::BRAIN)
         };
-        beside(&mut body, Vec3::X * 50.0);
-        assert_eq!((body.check(), body.unsupported()), (Err(BodyError::Loose(48)), Some(48)));
-        let held = Body { fixed: body.fixed.iter().flat_map(|&n| [n, n + count]).collect(), ..body.clone() };
-        assert_eq!((held.check(), held.is_supported()), (Ok(()), true));
-        let anchored = Body { anchors: vec![Anchor { node: count, ..Anchor::default() }], ..body.clone() };
-        assert_eq!((anchored.check(), anchored.is_supported()), (Ok(()), false));
-        let free = Body { fixed: Vec::new(), ..body.clone() };
-        assert_eq!((free.check(), free.unsupported()), (Ok(()), Some(0)));
-        // The second part hangs on one node of the first: held for a dynamic solver, but it can turn.
-        body.mesh.tets[48..].iter_mut().flatten().for_each(|n| *n = if *n == count { 0 } else { *n });
-        let mut hanging = body;
-        hanging.mesh.positions.remove(count as usize);
-        hanging.mesh.tets.iter_mut().flatten().for_each(|n| *n -= u32::from(*n > count));
-        hanging.mesh.positions[27..].iter_mut().for_each(|p| *p -= Vec3::X * 50.0);
-        assert_eq!((hanging.check(), hanging.unsupported()), (Ok(()), Some(48)));
+        let verdict = |body: &Body| (body.check(), body.unsupported());
+        assert_eq!(verdict(&two(0, &[0, 1, 2])), (Err(BodyError::Loose(1)), Some(1)));
+        assert_eq!(verdict(&two(0, &[0, 1, 2, 4, 5, 6])), (Ok(()), None));
+        assert_eq!(verdict(&two(0, &[])), (Ok(()), Some(0)), "a free body");
+        assert_eq!(verdict(&two(1, &[0, 1, 2])), (Ok(()), Some(1)), "it hangs on one node, and can turn");
+        let anchor = |along| vec![Anchor { node: 4, along, ..Anchor::default() }];
+        assert_eq!(Body { anchors: anchor(1.0), ..two(0, &[0, 1, 2]) }.check(), Ok(()));
+        assert_eq!(Body { anchors: anchor(0.0), ..two(0, &[0, 1, 2]) }.check(), Err(BodyError::Loose(1)));
     }
 }

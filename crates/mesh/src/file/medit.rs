@@ -2,7 +2,7 @@
 //!
 //! # Theory
 //! A list of sections, each a keyword, a count and that many rows: `Vertices` (x y z reference) and
-//! `Tetrahedra` (four nodes from 1, reference), or `TetrahedraP2` (ten). Other sections (triangles,
+//! `Tetrahedra` (four nodes from 1, reference), or `TetrahedraP2` (ten) and so on. Other sections (triangles,
 //! corners, ridges) are skipped up to the next keyword.
 //!
 //! # Practice
@@ -38,6 +38,14 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     })
 }
 
+/// The order of the elements of a section of tetrahedra: `Tetrahedra` has 1, `TetrahedraP3` 3.
+fn order(keyword: &str) -> Option<usize> {
+    match keyword.strip_prefix("Tetrahedra")? {
+        "" => Some(1),
+        order => order.strip_prefix('P')?.parse().ok().filter(|order| (1..10).contains(order)),
+    }
+}
+
 /// Sections of elements that are no tetrahedra.
 const OTHERS: [&str; 6] = ["Edges", "Triangles", "Quadrilaterals", "Hexahedra", "Prisms", "Pyramids"];
 
@@ -54,17 +62,16 @@ pub(crate) fn parse(mut reader: Reader) -> Result<Import<TetMesh>, FileError> {
             "End" => return reader.mesh(positions, elements),
             "Dimension" => dimension(&mut reader)?,
             "Vertices" => positions = vertices(&mut reader)?,
-            "Tetrahedra" => elements.tets.extend(tetrahedra(&mut reader, 4)?),
-            "TetrahedraP2" => {
-                let tets = tetrahedra(&mut reader, 10)?;
-                elements.of_more_nodes += tets.len();
+            keyword if order(keyword).is_some() => {
+                let order = order(keyword).unwrap_or(1);
+                let tets = tetrahedra(&mut reader, (order + 1) * (order + 2) * (order + 3) / 6)?;
+                elements.of_more_nodes += if order > 1 { tets.len() } else { 0 };
                 elements.tets.extend(tets);
             }
             other if other.parse::<f64>().is_err() => {
                 let count = reader.skip_numbers().unwrap_or_default() as usize;
-                if OTHERS.contains(&other.trim_end_matches("P2")) {
-                    elements.others = elements.others.saturating_add(count);
-                }
+                let kind = other.trim_end_matches(char::is_numeric).trim_end_matches('P');
+                elements.others = elements.others.saturating_add(if OTHERS.contains(&kind) { count } else { 0 });
             }
             number => return Err(reader.error("a keyword", number, "a word; is a count before it too small?")),
         }

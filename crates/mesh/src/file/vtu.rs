@@ -82,7 +82,7 @@ struct Xml<'a> {
     reader: &'a Reader,
     big_endian: bool,
     long_headers: bool,
-    zlib: bool,
+    compressor: Option<&'a str>,
     /// Start of appended data, and whether they are raw.
     appended: Option<(usize, bool)>,
 }
@@ -130,20 +130,10 @@ impl<'a> Xml<'a> {
         if kind != "UnstructuredGrid" {
             return Err(reader.error("the type", kind, "UnstructuredGrid; convert it to tetrahedra"));
         }
-        let zlib = match root.attribute("compressor") {
-            None => false,
-            Some("vtkZLibDataCompressor") => true,
-            Some(other) => {
-                return Err(reader.error(
-                    "the compressor",
-                    other,
-                    "none or vtkZLibDataCompressor; save it with another",
-                ));
-            }
-        };
         let big_endian = root.attribute("byte_order") == Some("BigEndian");
         let long_headers = root.attribute("header_type") == Some("UInt64");
-        Ok(Self { bytes, reader, big_endian, long_headers, zlib, appended: appended(bytes) })
+        let compressor = root.attribute("compressor");
+        Ok(Self { bytes, reader, big_endian, long_headers, compressor, appended: appended(bytes) })
     }
 
     /// The field `SPACE`; empty without one.
@@ -229,21 +219,20 @@ impl<'a> Xml<'a> {
     }
 
     fn binary_array(&self, tag: &Tag, name: &str, stream: &[u8]) -> Result<Vec<f64>, FileError> {
-        let bytes = if self.zlib { self.inflated(stream) } else { self.plain(stream) };
+        let bytes = match self.compressor {
+            None => self.plain(stream),
+            Some("vtkZLibDataCompressor") => self.inflated(stream),
+            Some(other) => {
+                let wanted = "none or vtkZLibDataCompressor; save it with another";
+                return Err(self.reader.error("the compressor", other, wanted));
+            }
+        };
         let bytes = bytes.ok_or_else(|| self.damaged(name, "cut off or damaged"))?;
         let kind = tag.attribute("type").unwrap_or_default();
         let (size, of) = number_type(kind).ok_or_else(|| {
             self.reader.error(format!("the type of {name}"), kind, "Float32, Float64 or Int/UInt of 8 to 64")
         })?;
-        let number = |raw: &[u8]| {
-            let mut little = [0; 8];
-            little[..size].copy_from_slice(raw);
-            if self.big_endian {
-                little[..size].reverse();
-            }
-            of(little)
-        };
-        Ok(bytes.chunks_exact(size).map(number).collect())
+        Ok(numbers(&bytes, (size, of), self.big_endian))
     }
 
     /// The length field at the start of data, and its size in bytes.
@@ -282,10 +271,10 @@ impl<'a> Xml<'a> {
 }
 
 /// Conversion of eight bytes to a number.
-type Meaning = fn([u8; 8]) -> f64;
+pub(crate) type Meaning = fn([u8; 8]) -> f64;
 
 /// Size of a number type and its conversion from little-endian, zero-padded bytes.
-fn number_type(kind: &str) -> Option<(usize, Meaning)> {
+pub(crate) fn number_type(kind: &str) -> Option<(usize, Meaning)> {
     Some(match kind {
         "Float32" => (4, |b| f32::from_bits(u64::from_le_bytes(b) as u32).into()),
         "Float64" => (8, f64::from_le_bytes),
@@ -299,6 +288,19 @@ fn number_type(kind: &str) -> Option<(usize, Meaning)> {
         "UInt64" => (8, |b| u64::from_le_bytes(b) as f64),
         _ => return None,
     })
+}
+
+/// Converts the numbers of a type in a row.
+pub(crate) fn numbers(bytes: &[u8], (size, of): (usize, Meaning), big_endian: bool) -> Vec<f64> {
+    let number = |raw: &[u8]| {
+        let mut little = [0; 8];
+        little[..size].copy_from_slice(raw);
+        if big_endian {
+            little[..size].reverse();
+        }
+        of(little)
+    };
+    bytes.chunks_exact(size).map(number).collect()
 }
 
 /// Start of appended data (after the underscore), and whether they are raw.
@@ -414,7 +416,12 @@ mod tests {
         assert!(fault("5 10", "5").contains("one for each cell"));
         assert!(fault("\"offsets\"", "\"off\"").contains("offsets is missing"));
         assert!(fault("0 0 0 1<", "0 0 0 z<").contains("a number of Points"));
-        assert!(fault("byte_order", "compressor=\"vtkLZ4DataCompressor\" byte_order").contains("compressor"));
+        let lz4 = TEXT.replace("byte_order", "compressor=\"vtkLZ4DataCompressor\" byte_order");
+        assert_eq!(of_text(&lz4, parse).unwrap(), of_text(TEXT, parse).unwrap(), "text is not compressed");
+        let fault = of_text(&lz4.replacen("ascii\">0 0 0 1 0 0 0 1 0 0 0 1", "binary\">AAAA", 1), parse)
+            .unwrap_err()
+            .to_string();
+        assert!(fault.contains("the compressor is vtkLZ4"), "{fault}");
     }
 
     #[test]
