@@ -7,6 +7,7 @@
 //! degenerate to rounding.
 
 use crate::{TetMesh, Topology};
+use std::collections::HashSet;
 
 /// Why a mesh cannot be made or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -120,17 +121,11 @@ impl TetMesh {
 
     /// Removes tetrahedra with the same four nodes as an earlier one, in whatever order.
     pub(crate) fn without_repeats(mut self) -> Self {
-        let key = |tet: &[u32; 4]| {
-            let mut nodes = *tet;
+        let mut seen = HashSet::with_capacity(self.tets.len());
+        self.tets.retain(|&(mut nodes)| {
             nodes.sort_unstable();
-            nodes
-        };
-        let mut order: Vec<usize> = (0..self.tets.len()).collect();
-        order.sort_by_key(|&t| key(&self.tets[t]));
-        let mut first = vec![false; self.tets.len()];
-        order.chunk_by(|&a, &b| key(&self.tets[a]) == key(&self.tets[b])).for_each(|same| first[same[0]] = true);
-        let mut first = first.into_iter();
-        self.tets.retain(|_| first.next() == Some(true));
+            seen.insert(nodes)
+        });
         self
     }
 

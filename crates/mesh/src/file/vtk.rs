@@ -304,19 +304,14 @@ pub(crate) fn elements(reader: &Reader, starts: &[usize], nodes: &[i64], types: 
     }
     let mut elements = Elements::default();
     for (cell, &kind) in types.iter().enumerate() {
-        let wanted = match kind {
-            TETRAHEDRON => 4..=4,
-            24 => 10..=10,
-            71 | 78 => 4..=usize::MAX,
-            _ => {
-                elements.others += 1;
-                continue;
-            }
-        };
+        if !matches!(kind, TETRAHEDRON | 24 | 71 | 78) {
+            elements.others += 1;
+            continue;
+        }
         let nodes = nodes.get(starts[cell]..starts[cell + 1]).unwrap_or_default();
-        let Some(&corners) = nodes.first_chunk::<4>().filter(|_| wanted.contains(&nodes.len())) else {
-            let wanted = format!("{} nodes, as its type {kind} has", wanted.start());
-            return Err(reader.error(format!("tetrahedron {cell}"), format!("{} nodes", nodes.len()), wanted));
+        let Some(&corners) = nodes.first_chunk::<4>().filter(|_| kind != TETRAHEDRON || nodes.len() == 4) else {
+            let got = format!("{} nodes", nodes.len());
+            return Err(reader.error(format!("tetrahedron {cell}"), got, "4 nodes, or more of a higher order"));
         };
         elements.tets.push(corners.map(|n| u32::try_from(n).unwrap_or(u32::MAX)));
         elements.of_more_nodes += usize::from(nodes.len() > 4);

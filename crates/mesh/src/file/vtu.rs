@@ -10,8 +10,9 @@
 //! # Practice
 //! Reads text, base64 and both kinds of appended data, uncompressed or zlib, in both byte orders;
 //! skips cells of other types and all point and cell data. Several pieces, LZ4 and LZMA are
-//! rejected. Writes uncompressed base64, f32. Positions are mm; the corner order is that of
-//! [`TetMesh`].
+//! rejected. Writes uncompressed base64, f32, and the field `SPACE` as 3D Slicer does; meshio 5.3.5
+//! reads no file with a text field, so give it another format. Positions are mm; the corner order is
+//! that of [`TetMesh`].
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
@@ -35,7 +36,7 @@ pub fn import(path: &Path) -> Result<Import<TetMesh>, FileError> {
 }
 
 /// Start of the text `RAS`, as 3D Slicer looks for it; letters are numbers, and 0 ends it.
-const SPACE: &str = "<DataArray type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">";
+const SPACE: &str = "<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">";
 
 /// Writes a mesh as VTK XML, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
@@ -51,7 +52,7 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
             out,
             "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
         )?;
-        writeln!(out, "<UnstructuredGrid>\n<FieldData>\n{SPACE}82 65 83 0</DataArray>\n</FieldData>")?;
+        writeln!(out, "<UnstructuredGrid>\n<FieldData>\n{SPACE}82 65 83 0</Array>\n</FieldData>")?;
         writeln!(out, "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<Points>")?;
         writeln!(out, "<DataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\" format=\"binary\">")?;
         writeln!(out, "{}\n</DataArray>\n</Points>\n<Cells>", inline(&positions))?;
@@ -140,7 +141,7 @@ impl<'a> Xml<'a> {
     fn space(&self) -> Result<String, FileError> {
         let mut at = 0;
         while let Some(tag) = Tag::next(self.bytes, at).filter(|tag| tag.name() != "AppendedData") {
-            if tag.name() == "DataArray" && tag.attribute("Name") == Some("SPACE") {
+            if tag.name() == "Array" && tag.attribute("Name") == Some("SPACE") {
                 let letters = self.array(&tag, "SPACE")?;
                 return Ok(letters.into_iter().map(|letter| char::from(letter as u8)).take(8).collect());
             }
@@ -162,7 +163,7 @@ impl<'a> Xml<'a> {
                 ("DataArray", "Cells", Some("connectivity")) => connectivity = Some(self.array(&tag, "connectivity")?),
                 ("DataArray", "Cells", Some("offsets")) => offsets = Some(self.array(&tag, "offsets")?),
                 ("DataArray", "Cells", Some("types")) => types = Some(self.array(&tag, "types")?),
-                ("DataArray" | "/DataArray", ..) => {}
+                ("DataArray" | "/DataArray" | "InformationKey" | "/InformationKey" | "Value" | "/Value", ..) => {}
                 (name, ..) => section = name,
             }
         }
@@ -397,6 +398,12 @@ mod tests {
         let text = of_text(TEXT, parse).unwrap();
         assert_eq!(text.tets, [[0, 1, 2, 3]]);
         assert_eq!(of_bytes(&appended_file(), parse).unwrap().mesh, text);
+        let space = "<FieldData><Array type=\"String\" Name=\"SPACE\" format=\"binary\">AAAABExQUwA=</Array></FieldData>\n<Piece";
+        let lps = of_bytes(TEXT.replace("<Piece", space).as_bytes(), parse).unwrap();
+        assert_eq!((lps.mesh.positions[1].x, &lps.notes[1..]), (-1.0, &[Note::Lps][..]));
+        let keys = "4<InformationKey name=\"L\"><Value index=\"0\">1</Value></InformationKey></DataArray>";
+        let keys = TEXT.replace("0 1 2 0 1 2 3</DataArray>", &format!("0 1 2 0 1 2 3{}", &keys[1..]));
+        assert_eq!(of_text(&keys, parse).unwrap(), text);
     }
 
     #[test]
