@@ -43,7 +43,7 @@ pub enum MeshError {
     #[error("node {0} belongs to no tetrahedron; drop it (TetMesh::without_orphans)")]
     Orphan(usize),
     /// A face shared by three or more tetrahedra.
-    #[error("tetrahedron {0} has a face with more than two tetrahedra, so the mesh overlaps itself")]
+    #[error("tetrahedron {0} has a face with more than two tetrahedra, so the mesh overlaps itself; mesh it anew")]
     Face(usize),
     /// An empty mask.
     #[error("the mask has no voxel that is not 0, so there is nothing to fill; give a mask of the organ")]

@@ -98,8 +98,8 @@ impl Factor {
         (0..self.size()).map(column).sum()
     }
 
-    /// Factors what was added; false when a pivot is not positive. A singular matrix, such as that of
-    /// a part that nothing holds, may pass by rounding: [`Body::is_supported`](crate::Body) tells.
+    /// Factors what was added; false when a pivot is not positive. A singular matrix, as of a part
+    /// that nothing holds, may pass by rounding; `Body::is_supported` finds that part.
     pub fn factor(&mut self) -> bool {
         let size = self.size();
         let shape = SymbolicSparseColMatRef::new_checked(size, size, &self.starts, None, &self.rows);

@@ -3,13 +3,13 @@
 //! # Theory
 //! Sections between `$Name` and `$EndName` (`$NOD` and `$ELM` in version 1). Nodes and elements
 //! carry their own numbers. Version 2.2 gives each element its type and tags; version 4.1 groups
-//! both by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one, 29 to 31
-//! those of higher order. Binary files hold little-endian i32, u64 and f64 after the counts.
+//! both by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one, 29 to
+//! 31 those of higher order. Binary files hold little-endian i32, u64 and f64 after the counts.
 //!
 //! # Practice
-//! Tetrahedra are read (of more nodes the corners), once if several physical groups list them; other
-//! elements and all tags are skipped. Writes 2.2 as text, with enough digits to restore each f32. Positions are mm; the corner order is that
-//! of [`TetMesh`]. Version 4.0 is rejected.
+//! Tetrahedra are read (of more nodes the corners), once if several physical groups list them;
+//! other elements and all tags are skipped. Writes 2.2 as text, with enough digits to restore each
+//! f32. Positions are mm; the corner order is that of [`TetMesh`]. Version 4.0 is rejected.
 //!
 //! # Sources
 //! C. Geuzaine, J.-F. Remacle: Gmsh reference manual, sections MSH file format.

@@ -2,12 +2,13 @@
 //!
 //! # Theory
 //! A list of sections, each a keyword, a count and that many rows: `Vertices` (x y z reference) and
-//! `Tetrahedra` (four nodes from 1, reference), or `TetrahedraP2` (ten) and so on. Other sections (triangles,
-//! corners, ridges) are skipped up to the next keyword.
+//! `Tetrahedra` (four nodes from 1, reference), or `TetrahedraP2` (ten) and so on. Other sections
+//! (triangles, corners, ridges) are skipped up to the next keyword.
 //!
 //! # Practice
-//! Reads the text form, dimension 3; references and nodes on edges are skipped. Writes version 2 with enough digits to
-//! restore each f32. Positions are mm; the corner order is that of [`TetMesh`].
+//! Reads the text form, dimension 3; references and nodes on edges are skipped. Writes version 2
+//! with enough digits to restore each f32. Positions are mm; the corner order is that of
+//! [`TetMesh`].
 //!
 //! # Sources
 //! P. Frey: MEDIT, an interactive mesh visualization software, INRIA RT-0253, 2001.

@@ -6,9 +6,9 @@
 //! written under a temporary name and then renamed.
 //!
 //! Every reader of tetrahedra ends in the same step: of elements with more nodes the corners stay,
-//! a tetrahedron that is listed again counts once, and nodes without a tetrahedron go. [`Note`] says
-//! so. STL, PLY, OBJ, VTK and VTU are written with `SPACE=RAS`, as 3D Slicer reads it; `SPACE=LPS`
-//! turns x and y. A file that says neither is taken as RAS, but by 3D Slicer as LPS.
+//! a tetrahedron that is listed again counts once, and nodes without a tetrahedron go. [`Note`]
+//! says so. STL, PLY, OBJ, VTK and VTU are written with `SPACE=RAS`, as 3D Slicer reads it;
+//! `SPACE=LPS` turns x and y. A file that says neither is taken as RAS, but by 3D Slicer as LPS.
 
 pub mod abaqus;
 mod format;

@@ -16,13 +16,11 @@
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::file::{Elements, FileError, Format, Import, Reader, vtu, write_atomically};
+use crate::file::{FileError, Format, Import, Reader, vtu, write_atomically};
 use crate::lattice::LabelledMesh;
 use std::io::Write;
 use std::path::Path;
 use trepan_geometry::Vec3;
-
-const TETRAHEDRON: u8 = 10;
 
 /// The format.
 pub const FORMAT: Format<TetMesh> =
@@ -76,7 +74,7 @@ fn write_grid(out: &mut dyn Write, mesh: &TetMesh) -> std::io::Result<()> {
         [4, tet[0], tet[1], tet[2], tet[3]].iter().try_for_each(|n| out.write_all(&n.to_be_bytes()))?;
     }
     writeln!(out, "\nCELL_TYPES {count}")?;
-    (0..count).try_for_each(|_| out.write_all(&u32::from(TETRAHEDRON).to_be_bytes()))?;
+    (0..count).try_for_each(|_| out.write_all(&u32::from(vtu::TETRAHEDRON).to_be_bytes()))?;
     writeln!(out)
 }
 
@@ -138,7 +136,7 @@ impl Legacy {
             }
         }
         let cells = cells.unwrap_or_default();
-        let elements = elements(&self.reader, &cells.starts, &cells.nodes, &types.unwrap_or_default())?;
+        let elements = vtu::elements(&self.reader, &cells.starts, &cells.nodes, &types.unwrap_or_default())?;
         self.reader.mesh(positions.unwrap_or_default(), elements)
     }
 
@@ -294,29 +292,6 @@ impl Legacy {
         let count = self.reader.count("the count of CELL_TYPES", 2)?;
         Ok(self.numbers("CELL_TYPES", count, "int")?.into_iter().map(|t| t as u8).collect())
     }
-}
-
-/// Sorts the cells of a grid by type; cell c has the nodes `starts[c]..starts[c + 1]`.
-pub(crate) fn elements(reader: &Reader, starts: &[usize], nodes: &[i64], types: &[u8]) -> Result<Elements, FileError> {
-    if starts.len() != types.len() + 1 {
-        let got = format!("{} for {} cells", types.len(), starts.len().saturating_sub(1));
-        return Err(reader.error("the count of cell types", got, "one for each cell"));
-    }
-    let mut elements = Elements::default();
-    for (cell, &kind) in types.iter().enumerate() {
-        if !matches!(kind, TETRAHEDRON | 24 | 71 | 78) {
-            elements.others += 1;
-            continue;
-        }
-        let nodes = nodes.get(starts[cell]..starts[cell + 1]).unwrap_or_default();
-        let Some(&corners) = nodes.first_chunk::<4>().filter(|_| kind != TETRAHEDRON || nodes.len() == 4) else {
-            let got = format!("{} nodes", nodes.len());
-            return Err(reader.error(format!("tetrahedron {cell}"), got, "4 nodes, or more of a higher order"));
-        };
-        elements.tets.push(corners.map(|n| u32::try_from(n).unwrap_or(u32::MAX)));
-        elements.of_more_nodes += usize::from(nodes.len() > 4);
-    }
-    Ok(elements)
 }
 
 #[cfg(test)]

@@ -2,28 +2,31 @@
 //!
 //! # Theory
 //! An `UnstructuredGrid` with one `Piece`: `Points`, and `Cells` as `connectivity`, `offsets` and
-//! `types` (those of [`vtk`]). A `DataArray` is text, base64 between its tags, or at an
-//! offset in `AppendedData` (base64 or raw). Binary data start with their length; compressed data
-//! with the number of blocks, the size of a block and of the last one, and each block's compressed
-//! size.
+//! `types` (10 is the 4-node tetrahedron, 24 the 10-node one, 71 and 78 those of any order). A
+//! `DataArray` is text, base64 between its tags, or at an offset in `AppendedData` (base64 or raw).
+//! Binary data start with their length; compressed data with the number of blocks, the size of a
+//! block and of the last one, and each block's compressed size.
 //!
 //! # Practice
 //! Reads text, base64 and both kinds of appended data, uncompressed or zlib, in both byte orders;
 //! skips cells of other types and all point and cell data. Several pieces, LZ4 and LZMA are
 //! rejected. Writes uncompressed base64, f32, and the field `SPACE` as 3D Slicer does; meshio 5.3.5
-//! reads no file with a text field, so give it another format. Positions are mm; the corner order is
-//! that of [`TetMesh`].
+//! reads no file with a text field, so give it another format. Positions are mm; the corner order
+//! is that of [`TetMesh`].
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::file::{Elements, FileError, Format, Import, Reader, vtk, write_atomically};
+use crate::file::{Elements, FileError, Format, Import, Reader, write_atomically};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use std::io::Read;
 use std::path::Path;
 use trepan_geometry::Vec3;
+
+/// Cell type of the 4-node tetrahedron.
+pub(crate) const TETRAHEDRON: u8 = 10;
 
 /// The format.
 pub const FORMAT: Format<TetMesh> =
@@ -43,7 +46,7 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     let positions: Vec<u8> = mesh.positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
     let connectivity: Vec<u8> = mesh.tets.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
     let offsets: Vec<u8> = (1..=mesh.tets.len() as u64).flat_map(|n| (4 * n).to_le_bytes()).collect();
-    let types = vec![10; mesh.tets.len()];
+    let types = vec![TETRAHEDRON; mesh.tets.len()];
     let inline = |bytes: &[u8]| BASE64.encode([&(bytes.len() as u64).to_le_bytes(), bytes].concat());
     write_atomically(path, |out| {
         let (nodes, cells) = (mesh.positions.len(), mesh.tets.len());
@@ -177,7 +180,7 @@ impl<'a> Xml<'a> {
         let starts: Vec<usize> = [0].into_iter().chain(offsets.into_iter().map(|end| end as usize)).collect();
         let nodes = connectivity.ok_or_else(|| missing("connectivity"))?.into_iter().map(|n| n as i64);
         let types: Vec<u8> = types.into_iter().map(|kind| kind as u8).collect();
-        let elements = vtk::elements(self.reader, &starts, &nodes.collect::<Vec<_>>(), &types)?;
+        let elements = elements(self.reader, &starts, &nodes.collect::<Vec<_>>(), &types)?;
         Ok((positions.collect::<Result<_, _>>()?, elements))
     }
 
@@ -302,6 +305,29 @@ pub(crate) fn numbers(bytes: &[u8], (size, of): (usize, Meaning), big_endian: bo
         of(little)
     };
     bytes.chunks_exact(size).map(number).collect()
+}
+
+/// Sorts the cells of a grid by type; cell c has the nodes `starts[c]..starts[c + 1]`.
+pub(crate) fn elements(reader: &Reader, starts: &[usize], nodes: &[i64], types: &[u8]) -> Result<Elements, FileError> {
+    if starts.len() != types.len() + 1 {
+        let got = format!("{} for {} cells", types.len(), starts.len().saturating_sub(1));
+        return Err(reader.error("the count of cell types", got, "one for each cell"));
+    }
+    let mut elements = Elements::default();
+    for (cell, &kind) in types.iter().enumerate() {
+        if !matches!(kind, TETRAHEDRON | 24 | 71 | 78) {
+            elements.others += 1;
+            continue;
+        }
+        let nodes = nodes.get(starts[cell]..starts[cell + 1]).unwrap_or_default();
+        let Some(&corners) = nodes.first_chunk::<4>().filter(|_| kind != TETRAHEDRON || nodes.len() == 4) else {
+            let got = format!("{} nodes", nodes.len());
+            return Err(reader.error(format!("tetrahedron {cell}"), got, "4 nodes, or more of a higher order"));
+        };
+        elements.tets.push(corners.map(|n| u32::try_from(n).unwrap_or(u32::MAX)));
+        elements.of_more_nodes += usize::from(nodes.len() > 4);
+    }
+    Ok(elements)
 }
 
 /// Start of appended data (after the underscore), and whether they are raw.
