@@ -12,6 +12,6 @@ pub struct Format {
     pub file: fn(&Path) -> PathBuf,
     /// Whether a file that starts with these bytes (512, decompressed) is of this format.
     pub starts: fn(&[u8]) -> bool,
-    /// Reads the named file, with notes.
-    pub import: fn(&Path) -> Result<Import, ReadError>,
+    /// Reads the named file, with notes; of several volumes in it, the one of a number (from 0).
+    pub import: fn(&Path, Option<usize>) -> Result<Import, ReadError>,
 }

@@ -39,6 +39,7 @@ mod registration;
 mod regular;
 mod resample;
 mod sample;
+mod segmentation;
 mod skull;
 mod source;
 mod spline;
@@ -56,7 +57,7 @@ pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
 pub use flap::{FlapSearch, FlapState};
 pub use format::Format;
-pub use list::{FORMATS, import, import_among, read};
+pub use list::{FORMATS, import, import_among, import_number, read};
 pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};
@@ -66,6 +67,7 @@ pub use registration::{Registration, RegistrationConfig, RegistrationError, regi
 pub use regular::{open_regular, read_regular};
 pub use resample::{Grid, Interpolation, resample};
 pub use sample::{ByteOrder, Number, Sample};
+pub use segmentation::{Segment, Segmentation};
 pub use skull::{
     GREATEST_ISOVALUE, HounsfieldError, Islands, LEAST_ISOVALUE, bone_isovalue, hounsfield, is_ct, labels, skull_only,
 };

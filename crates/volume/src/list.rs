@@ -22,17 +22,24 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
 
 /// Reads a volume in any of the [`FORMATS`], with notes about the file.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
-    import_among(FORMATS, path)
+    import_among(FORMATS, path, None)
+}
+
+/// Reads the DICOM series of a folder or the volume of a file that has a number (from 0).
+pub fn import_number(path: &Path, number: usize) -> Result<Import, ReadError> {
+    import_among(FORMATS, path, Some(number))
 }
 
 /// Reads a volume in the first of `formats` that the content belongs to, with notes.
-pub fn import_among(formats: &[Format], path: &Path) -> Result<Import, ReadError> {
+pub fn import_among(formats: &[Format], path: &Path, number: Option<usize>) -> Result<Import, ReadError> {
     if path.is_dir() {
-        return dicom::import(path);
+        return (dicom::FORMAT.import)(path, number);
     }
     for format in formats {
         if (format.starts)(Source::open(&(format.file)(path))?.peek(START)?) {
-            return (format.import)(path);
+            let mut import = (format.import)(path, number)?;
+            import.facts.insert(0, ("format", format.name.into()));
+            return Ok(import);
         }
     }
     let found = foreign(Source::open(path)?.peek(START)?).into();

@@ -11,6 +11,8 @@ pub struct Import {
     pub notes: Vec<Note>,
     /// CT, MR or another modality's two letters, where the format says it (DICOM).
     pub modality: Option<String>,
+    /// What the reader saw, by name: format, stored numbers, unit, which transform was taken.
+    pub facts: Vec<(&'static str, String)>,
 }
 
 /// A property of a file that is not an error but matters to the user.
@@ -73,6 +75,6 @@ impl Import {
         if count > 0 {
             notes.push(Note::NotANumber { count });
         }
-        Self { volume, notes, modality: None }
+        Self { volume, notes, modality: None, facts: Vec::new() }
     }
 }

@@ -301,6 +301,18 @@ impl Source {
     }
 }
 
+/// Refuses a number other than 0 for a file that holds one volume.
+pub(crate) fn only(file: &Path, number: Option<usize>) -> Result<(), ReadError> {
+    match number {
+        None | Some(0) => Ok(()),
+        Some(n) => Err(ReadError::Series {
+            folder: file.into(),
+            found: format!("there is no volume {n}: it holds one, number 0"),
+            remedy: "leave the number out",
+        }),
+    }
+}
+
 /// Truncates a value for a message to one short line, since the rest of a damaged header may hold
 /// patient data.
 fn shown(found: &str) -> String {

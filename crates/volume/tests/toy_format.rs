@@ -9,11 +9,11 @@ const TOY: Format = Format {
     name: "toy (.toy)",
     file: Path::to_path_buf,
     starts: |bytes| bytes.starts_with(b"TOY"),
-    import: |path| {
+    import: |path, _| {
         let bytes = std::fs::read(path).map_err(|source| ReadError::Io { file: path.into(), source })?;
         let value = f32::from(bytes.get(3).copied().unwrap_or_default());
         let volume = VoxelVolume::filled([2; 3], DAffine3::from_scale(DVec3::ONE), value);
-        Ok(Import { volume, notes: Vec::new(), modality: None })
+        Ok(Import { volume, notes: Vec::new(), modality: None, facts: Vec::new() })
     },
 };
 
@@ -22,8 +22,8 @@ fn a_format_of_one_file_is_recognised_and_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.nii");
     std::fs::write(&path, b"TOY\x07").unwrap();
-    let import = import_among(&[TOY], &path).unwrap();
+    let import = import_among(&[TOY], &path, None).unwrap();
     assert_eq!(import.volume.data, [7.0; 8]);
-    let unknown = import_among(FORMATS, &path).unwrap_err().to_string();
+    let unknown = import_among(FORMATS, &path, None).unwrap_err().to_string();
     assert!(unknown.contains("NIfTI") && unknown.contains("DICOM"), "{unknown}");
 }

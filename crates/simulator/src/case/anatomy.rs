@@ -9,7 +9,7 @@ use std::path::Path;
 use trepan_mesh::lattice::{self, Fine};
 use trepan_volume::{
     AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, Islands, MaskError, ReadError,
-    RegistrationConfig, VoxelVolume, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register,
+    RegistrationConfig, VoxelVolume, check_brain_mask, hounsfield, is_ct, largest_component, overlap, register,
     resample, room_for, room_for_voxels, skull_only,
 };
 
@@ -23,7 +23,7 @@ const TET_BYTES: u64 = 4096;
 
 /// Reads an image, or one DICOM series of a folder.
 fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
-    series.map_or_else(|| trepan_volume::import(path), |number| dicom::import_series(path, number))
+    series.map_or_else(|| trepan_volume::import(path), |number| trepan_volume::import_number(path, number))
 }
 
 /// Reads a CT in HU, and adds remarks on it.

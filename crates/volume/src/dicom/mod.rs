@@ -61,7 +61,7 @@ pub struct Series {
 }
 
 /// The format.
-pub const FORMAT: Format = Format { name: "DICOM", file: Path::to_path_buf, starts, import };
+pub const FORMAT: Format = Format { name: "DICOM", file: Path::to_path_buf, starts, import: import_number };
 
 fn starts(bytes: &[u8]) -> bool {
     bytes.get(128..132) == Some(b"DICM") || matches!(bytes, [2 | 8, 0, _, 0, ..])
@@ -83,6 +83,10 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
         Some(wanted) => groups.read(path, wanted),
         None => Err(no_picture(path)),
     }
+}
+
+fn import_number(path: &Path, number: Option<usize>) -> Result<Import, ReadError> {
+    number.map_or_else(|| import(path), |number| import_series(path, number))
 }
 
 /// Reads the series at an index of [`series`]'s list, from 0.
@@ -178,7 +182,8 @@ impl Groups {
         )?;
         let volume = voxels(path, &stack)?;
         let modality = Some(group[0].modality.clone()).filter(|modality| !modality.is_empty());
-        Ok(Import { modality, ..Import::new(volume, notes) })
+        let facts = vec![("transform", "position and orientation of the slices, LPS turned to RAS".into())];
+        Ok(Import { modality, facts, ..Import::new(volume, notes) })
     }
 }
 

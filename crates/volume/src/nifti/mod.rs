@@ -32,8 +32,12 @@ use header::Header;
 use std::path::{Path, PathBuf};
 
 /// The format.
-pub const FORMAT: Format =
-    Format { name: "NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img)", file: header_of_pair, starts, import };
+pub const FORMAT: Format = Format {
+    name: "NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img)",
+    file: header_of_pair,
+    starts,
+    import: read_one,
+};
 
 fn starts(bytes: &[u8]) -> bool {
     let size = bytes.first_chunk::<4>().copied().unwrap_or_default();
@@ -52,12 +56,12 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
 
 /// Reads volume number `index` (from 0) of a file with several: time points, directions, vector
 /// components.
-pub fn import_volume(path: &Path, index: u64) -> Result<Import, ReadError> {
+pub fn import_volume(path: &Path, index: usize) -> Result<Import, ReadError> {
     read_one(path, Some(index))
 }
 
-fn read_one(path: &Path, index: Option<u64>) -> Result<Import, ReadError> {
-    import_source(Source::open(&header_of_pair(path))?, index)
+fn read_one(path: &Path, index: Option<usize>) -> Result<Import, ReadError> {
+    import_source(Source::open(&header_of_pair(path))?, index.map(|n| n as u64))
 }
 
 /// Reads from a source that starts with the header.

@@ -23,14 +23,14 @@ pub use write::write;
 
 use crate::keys::{Keys, numbers};
 use crate::sample::{ByteOrder, Number, Scale};
-use crate::source::Source;
+use crate::source::{Source, only};
 use crate::{Format, Import, Note, ReadError, VoxelVolume};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
 
 /// The format.
 pub const FORMAT: Format =
-    Format { name: "NRRD", file: Path::to_path_buf, starts: |bytes| bytes.starts_with(b"NRRD"), import };
+    Format { name: "NRRD", file: Path::to_path_buf, starts: |bytes| bytes.starts_with(b"NRRD"), import: import_only };
 
 /// Reads the volume of a file.
 pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
@@ -40,6 +40,11 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
 /// Reads the volume of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     import_source(Source::open(path)?)
+}
+
+fn import_only(path: &Path, number: Option<usize>) -> Result<Import, ReadError> {
+    only(path, number)?;
+    import(path)
 }
 
 /// Reads from a source that starts with the header.
