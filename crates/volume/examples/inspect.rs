@@ -25,6 +25,7 @@ fn main() {
                     volume.get([5, 7, 3]),
                     volume.get(last)
                 );
+                import.facts.iter().for_each(|(name, fact)| println!("    {name}: {fact}"));
                 import.notes.iter().for_each(|note| println!("    note: {note}"));
             }
         }

@@ -7,21 +7,23 @@ use std::str::FromStr;
 /// Most lines of a header.
 const MOST_LINES: usize = 10_000;
 
-/// The keys and values of a header, keys in lower case without spaces.
+/// The keys and values of a header, keys in lower case without spaces; those of NRRD's "key:=value"
+/// start with a colon.
 pub(crate) struct Keys(Vec<(String, String)>);
 
 impl Keys {
     /// Reads lines until `last` is true for one, or the file ends.
     ///
-    /// Skips lines that start with # or contain ":=" (NRRD comments).
+    /// Skips lines that start with #.
     pub fn read(source: &mut Source, parting: &str, last: impl Fn(&str) -> bool) -> Result<Self, ReadError> {
         let mut keys = Vec::new();
         for _ in 0..MOST_LINES {
             let Some(line) = source.line()? else { return Ok(Self(keys)) };
-            if let Some((key, value)) =
-                line.split_once(parting).filter(|(_, value)| !line.starts_with('#') && !value.starts_with('='))
-            {
-                keys.push((plain(key), value.trim().to_owned()));
+            if let Some((key, value)) = line.split_once(parting).filter(|_| !line.starts_with('#')) {
+                match value.strip_prefix('=') {
+                    Some(value) => keys.push((format!(":{}", plain(key)), value.trim().to_owned())),
+                    None => keys.push((plain(key), value.trim().to_owned())),
+                }
             }
             if last(&line) {
                 return Ok(Self(keys));
@@ -34,6 +36,11 @@ impl Keys {
     pub fn text(&self, names: &[&str]) -> Option<&str> {
         let found = names.iter().find_map(|name| self.0.iter().find(|(key, _)| *key == plain(name)));
         found.map(|(_, value)| value.as_str())
+    }
+
+    /// Keys that start with `start`, without it, and their values.
+    pub fn starting(&self, start: &str) -> impl Iterator<Item = (&str, &str)> {
+        self.0.iter().filter_map(move |(key, value)| Some((key.strip_prefix(start)?, value.as_str())))
     }
 
     /// The value of a required key.

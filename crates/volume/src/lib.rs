@@ -57,7 +57,7 @@ pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
 pub use flap::{FlapSearch, FlapState};
 pub use format::Format;
-pub use list::{FORMATS, import, import_among, import_number, read};
+pub use list::{FORMATS, import, import_among, import_number, read, write_beside};
 pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};

@@ -6,8 +6,8 @@
 
 use crate::format::Format;
 use crate::source::Source;
-use crate::{Import, ReadError, VoxelVolume, dicom, metaimage, nifti, nrrd};
-use std::path::Path;
+use crate::{Import, ReadError, Sample, VoxelVolume, WriteError, dicom, metaimage, nifti, nrrd};
+use std::path::{Path, PathBuf};
 
 /// The formats that are read.
 pub const FORMATS: &[Format] = &[nifti::FORMAT, nrrd::FORMAT, metaimage::FORMAT, dicom::FORMAT];
@@ -47,6 +47,18 @@ pub fn import_among(formats: &[Format], path: &Path, number: Option<usize>) -> R
     Err(ReadError::Format { file: path.into(), found, readable })
 }
 
+/// Writes a volume that every common program opens: `NAME.nii.gz`, or `NAME.nrrd` if it is sheared
+/// (tilted gantry). Returns the path.
+///
+/// ITK programs refuse a sheared NIfTI, and NRRD holds the same voxels without resampling.
+pub fn write_beside<T: Sample>(folder: &Path, name: &str, volume: &VoxelVolume<T>) -> Result<PathBuf, WriteError> {
+    let at = |end: &str| folder.join(format!("{name}.{end}"));
+    match nifti::is_sheared(volume.world_from_voxel) {
+        false => nifti::write(&at("nii.gz"), volume).map(|()| at("nii.gz")),
+        true => nrrd::write(&at("nrrd"), volume).map(|()| at("nrrd")),
+    }
+}
+
 /// Names a content that is not read.
 fn foreign(start: &[u8]) -> &'static str {
     match start {
@@ -55,7 +67,6 @@ fn foreign(start: &[u8]) -> &'static str {
         [0xff, 0xd8, 0xff, ..] => "it is a JPEG picture",
         [b'P', b'K', 3, 4, ..] => "it is a ZIP archive; unpack it first",
         [b'%', b'P', b'D', b'F', ..] => "it is a PDF document",
-        [0, 0, 0, 1, ..] => "it looks like MGH (FreeSurfer); convert it with mri_convert to .nii.gz",
         _ if start.iter().all(|&b| b == b'\n' || b == b'\r' || b == b'\t' || (32..127).contains(&b)) => "it is a text",
         _ => "its first bytes are of no known format",
     }

@@ -43,6 +43,16 @@ pub enum Note {
         /// Largest distance between where the two put a corner.
         by_mm: f64,
     },
+    /// A field that is not as it should be, and what was done.
+    #[error("{field} is {found}: {taken}")]
+    Unusual {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        found: String,
+        /// What was done instead, and what to check.
+        taken: &'static str,
+    },
     /// One of several was read.
     #[error("{count} {what} are in there; number {chosen} (from 0) is read")]
     OneOf {

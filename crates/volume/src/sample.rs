@@ -97,6 +97,12 @@ impl Scale {
     pub const NONE: Self = Self { slope: 1.0, intercept: 0.0 };
 }
 
+impl std::fmt::Display for Scale {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} x stored + {}", self.slope, self.intercept)
+    }
+}
+
 impl Number {
     /// Bytes of one number.
     pub fn bytes(self) -> usize {
@@ -105,6 +111,31 @@ impl Number {
             Self::U16 | Self::I16 => 2,
             Self::U32 | Self::I32 | Self::F32 => 4,
             Self::U64 | Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    /// Name and byte order, for the facts of an import.
+    pub(crate) fn stored(self, order: ByteOrder) -> String {
+        match (self.bytes(), order) {
+            (1, _) => self.name().into(),
+            (_, ByteOrder::Little) => format!("{}, little-endian", self.name()),
+            (_, ByteOrder::Big) => format!("{}, big-endian", self.name()),
+        }
+    }
+
+    /// Name, as NRRD writes it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "uint8",
+            Self::I8 => "int8",
+            Self::U16 => "uint16",
+            Self::I16 => "int16",
+            Self::U32 => "uint32",
+            Self::I32 => "int32",
+            Self::U64 => "uint64",
+            Self::I64 => "int64",
+            Self::F32 => "float",
+            Self::F64 => "double",
         }
     }
 

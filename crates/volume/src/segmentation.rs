@@ -5,7 +5,7 @@
 //! segmentation of 3D Slicer (`.seg.nrrd`) and a DICOM SEG also name their segments; segments that
 //! overlap lie in layers of their own.
 
-use crate::{ReadError, VoxelVolume, labels, read};
+use crate::{ReadError, VoxelVolume, import_number, labels, nrrd, read};
 use std::path::Path;
 
 /// Label volumes of one file, and the segments that it names.
@@ -29,8 +29,14 @@ pub struct Segment {
 }
 
 impl Segmentation {
-    /// Reads a label file of any format, without trusting its sizes.
+    /// Reads a label file of any format, without trusting its sizes. Labels that are no whole numbers
+    /// from 0 to 65535 are an error.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
-        Ok(Self { layers: vec![labels(path, &read(path)?)?], segments: Vec::new() })
+        let (count, segments) = nrrd::segments(path)?;
+        let layers: Result<_, ReadError> = match count {
+            1 => labels(path, &read(path)?).map(|layer| vec![layer]),
+            _ => (0..count).map(|layer| labels(path, &import_number(path, layer)?.volume)).collect(),
+        };
+        Ok(Self { layers: layers?, segments })
     }
 }

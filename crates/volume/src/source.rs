@@ -6,10 +6,11 @@
 //! grows only with the data received.
 
 use crate::sample::{ByteOrder, Number, Scale};
-use crate::{ReadError, VoxelVolume, open_regular, room_for_voxels};
-use flate2::read::{MultiGzDecoder, ZlibDecoder};
+use crate::{Note, ReadError, VoxelVolume, open_regular, room_for_voxels};
+use flate2::bufread::GzDecoder;
+use flate2::read::ZlibDecoder;
 use glam::{DAffine3, DVec3};
-use std::io::{self, Cursor, Read};
+use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// First bytes of a gzip file.
@@ -55,7 +56,7 @@ impl Source {
             _ => io(source),
         })?;
         let length = file.metadata().map_err(io)?.len();
-        Ok(Self::of_stream(path, Box::new(io::BufReader::with_capacity(CHUNK, file)), length))
+        Ok(Self::of_stream(path, Box::new(BufReader::with_capacity(CHUNK, file)), length))
     }
 
     /// A source from bytes in memory; `name` appears in messages.
@@ -78,7 +79,7 @@ impl Source {
 
     /// The remaining bytes, decompressed as gzip.
     pub fn gunzipped(self) -> Self {
-        self.unpacked(|stream| Box::new(MultiGzDecoder::new(stream)))
+        self.unpacked(|stream| Box::new(Gunzip(Some(GzDecoder::new(BufReader::with_capacity(CHUNK, stream))))))
     }
 
     /// The remaining bytes, decompressed as gzip or zlib by content.
@@ -96,6 +97,11 @@ impl Source {
     /// The file's path.
     pub fn file(&self) -> &Path {
         &self.file
+    }
+
+    /// How the bytes are packed, for the facts of an import.
+    pub fn packing(&self) -> String {
+        if self.compressed { "gzip" } else { "none" }.into()
     }
 
     /// Bytes consumed so far.
@@ -222,17 +228,22 @@ impl Source {
         Ok(())
     }
 
-    /// Decodes the next `count` numbers.
+    /// Decodes the `count` numbers of one volume of several.
     pub fn samples(
         &mut self,
+        part: Part,
         count: u64,
         number: Number,
         order: ByteOrder,
         scale: Scale,
     ) -> Result<Vec<f32>, ReadError> {
-        let needed = count.saturating_mul(number.bytes() as u64);
+        let needed = count.saturating_mul(part.of).saturating_mul(number.bytes() as u64);
         if needed > self.left {
             return Err(self.truncated("voxels", needed, self.left));
+        }
+        if part.of > 1 && part.run == count {
+            self.skip(needed / part.of * part.chosen, "voxels")?;
+            return self.samples(Part::WHOLE, count, number, order, scale);
         }
         let mut values = Vec::new();
         if !self.compressed {
@@ -240,6 +251,7 @@ impl Source {
         }
         let mut buffer = vec![0; CHUNK.min(needed as usize)];
         let mut left = needed;
+        let mut first = 0;
         while left > 0 {
             let wanted = left.min(buffer.len() as u64) as usize;
             let got = self.some(&mut buffer[..wanted])?;
@@ -247,7 +259,10 @@ impl Source {
                 return Err(self.truncated("voxels", needed, needed - left + got as u64));
             }
             grow(&mut values, wanted / number.bytes(), count as usize);
+            let known = values.len();
             number.decode(&buffer[..wanted], order, scale, &mut values);
+            part.keep(&mut values, known, first);
+            first += (wanted / number.bytes()) as u64;
             left -= wanted as u64;
         }
         Ok(values)
@@ -301,15 +316,68 @@ impl Source {
     }
 }
 
-/// Refuses a number other than 0 for a file that holds one volume.
-pub(crate) fn only(file: &Path, number: Option<usize>) -> Result<(), ReadError> {
-    match number {
-        None | Some(0) => Ok(()),
-        Some(n) => Err(ReadError::Series {
-            folder: file.into(),
-            found: format!("there is no volume {n}: it holds one, number 0"),
-            remedy: "leave the number out",
-        }),
+/// One volume of several in a file: runs of `run` numbers belong to volumes 0, 1, … `of - 1`, 0, ….
+#[derive(Clone, Copy)]
+pub(crate) struct Part {
+    pub run: u64,
+    pub of: u64,
+    pub chosen: u64,
+}
+
+impl Part {
+    pub const WHOLE: Self = Self { run: u64::MAX, of: 1, chosen: 0 };
+
+    /// The volume of a number among `of`, which `field` announces; without a number there is only
+    /// one.
+    pub fn numbered(
+        file: &Path,
+        field: &'static str,
+        (run, of): (u64, u64),
+        number: Option<usize>,
+    ) -> Result<(Self, Option<Note>), ReadError> {
+        let wrong = |remedy| ReadError::Volumes { file: file.into(), field, found: of, remedy };
+        let chosen = match number {
+            None if of == 1 => 0,
+            None => return Err(wrong("one must be chosen: give --ct-series N or --mri-series N, from 0")),
+            Some(n) if (n as u64) < of => n as u64,
+            Some(_) => return Err(wrong("numbers go from 0 to one less")),
+        };
+        let note = Note::OneOf { what: "volumes", count: of as usize, chosen: chosen as usize };
+        Ok((Self { run, of, chosen }, (of > 1).then_some(note)))
+    }
+
+    /// Drops what belongs to other volumes from `values[known..]`, the first being number `first`.
+    pub fn keep(self, values: &mut Vec<f32>, known: usize, first: u64) {
+        if self.of > 1 {
+            let mut end = known;
+            for at in known..values.len() {
+                if (first + (at - known) as u64) / self.run % self.of == self.chosen {
+                    values[end] = values[at];
+                    end += 1;
+                }
+            }
+            values.truncate(end);
+        }
+    }
+}
+
+/// Gunzips members one after another and ignores what follows them, as gzip(1) does.
+struct Gunzip(Option<GzDecoder<BufReader<Box<dyn Read>>>>);
+
+impl Read for Gunzip {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while let Some(mut member) = self.0.take() {
+            let got = member.read(buffer)?;
+            if got > 0 || buffer.is_empty() {
+                self.0 = Some(member);
+                return Ok(got);
+            }
+            let mut rest = member.into_inner();
+            if rest.fill_buf()?.first() == Some(&GZIP[0]) {
+                self.0 = Some(GzDecoder::new(rest));
+            }
+        }
+        Ok(0)
     }
 }
 

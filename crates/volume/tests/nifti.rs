@@ -5,7 +5,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use trepan_volume::{Note, ReadError, VoxelVolume, WriteError, nifti, read};
+use trepan_volume::{Import, Note, ReadError, VoxelVolume, WriteError, nifti, nrrd, read, write_beside};
 
 /// A NIfTI-1 file with i16 voxels 0, 1, 2, … whose fields can be overwritten.
 #[derive(Clone)]
@@ -22,7 +22,7 @@ impl File1 {
             file.put(40 + 2 * n, size.to_be_bytes());
         }
         file.i16(70, 4).i16(72, 16).f32(108, 352.0).f32(112, 1.0);
-        for (n, size) in [1.0, 1.0, 2.0, 3.0].into_iter().enumerate() {
+        for (n, size) in [1.0, 1.0, 2.0, 9.25f32.sqrt()].into_iter().enumerate() {
             file.f32(76 + 4 * n, size);
         }
         file.i16(254, 1).srow([[-1.0, 0.0, 0.0, 9.0], [0.0, 2.0, 0.5, -4.0], [0.0, 0.0, 3.0, 7.0]]);
@@ -55,6 +55,20 @@ impl File1 {
             self.f32(280 + 4 * n, value);
         }
         self
+    }
+
+    /// Sets the form codes, the edges and a qform of identity with offset (1, 2, 3).
+    fn forms(&mut self, sform: i16, qform: i16, edges: [f32; 3]) -> &mut Self {
+        self.i16(254, sform).i16(252, qform).f32(268, 1.0).f32(272, 2.0).f32(276, 3.0);
+        for (n, edge) in edges.into_iter().enumerate() {
+            self.f32(80 + 4 * n, edge);
+        }
+        self
+    }
+
+    fn import(&self) -> Result<Import, ReadError> {
+        let folder = tempfile::tempdir().unwrap();
+        nifti::import(&saved(folder.path(), "a.nii", &self.bytes))
     }
 
     fn read(&self) -> Result<VoxelVolume<f32>, ReadError> {
@@ -174,8 +188,13 @@ fn slope_zero_means_no_scaling_and_others_scale() {
     let mut file = File1::new([2, 2, 2], false);
     assert_eq!(file.f32(112, 0.0).f32(116, 55.0).read().unwrap().data[7], 7.0);
     assert_eq!(file.f32(112, 2.0).f32(116, -1024.0).read().unwrap().data[7], -1010.0);
-    let error = file.f32(112, f32::NAN).read().unwrap_err();
-    assert!(matches!(error, ReadError::Field { field: "scl_slope", .. }), "{error}");
+    for (slope, intercept, last) in
+        [(f32::NAN, f32::NAN, 7.0), (f32::INFINITY, 5.0, 7.0), (f32::NAN, 5.0, 7.0), (2.0, f32::NAN, 14.0)]
+    {
+        let import = file.f32(112, slope).f32(116, intercept).import().unwrap();
+        assert_eq!(import.volume.data[7], last, "{slope} {intercept}");
+        assert!(import.notes.iter().any(|note| matches!(note, Note::Unusual { field: "scl_slope", .. })));
+    }
 }
 
 #[test]
@@ -188,13 +207,69 @@ fn orientation_comes_from_sform_then_qform_then_spacing_with_a_note() {
     let both = import(&file);
     assert_eq!(both.volume.world_from_voxel, sheared());
     assert!(matches!(both.notes[..], [Note::TwoOrientations { used: "sform", .. }]), "{:?}", both.notes);
-    let quaternion = import(file.i16(254, 0));
+    let quaternion = import(file.f32(88, 3.0).i16(254, 0));
     let columns = DMat3::from_cols(DVec3::Y, -2.0 * DVec3::X, -3.0 * DVec3::Z);
     assert!(quaternion.volume.world_from_voxel.matrix3.abs_diff_eq(columns, 1e-6));
     assert_eq!(quaternion.volume.world_from_voxel.translation, DVec3::new(1.0, 2.0, 3.0));
     let none = import(file.i16(252, 0));
-    assert_eq!(none.volume.world_from_voxel, DAffine3::from_scale(DVec3::new(1.0, 2.0, 3.0)));
+    let left_front_head = DMat3::from_diagonal(DVec3::new(-1.0, 2.0, 3.0));
+    let centred = DAffine3 { matrix3: left_front_head, translation: DVec3::new(1.0, -2.0, -3.0) };
+    assert_eq!(none.volume.world_from_voxel, centred);
     assert!(matches!(none.notes[..], [Note::NoOrientation { .. }]));
+}
+
+#[test]
+fn the_transform_that_counts_is_the_one_that_the_policy_names() {
+    let ns = |edge: f32, far: f32| [[edge, 0.0, 0.0, far], [0.0, edge, 0.0, far], [0.0, 0.0, 2.0 * edge, far]];
+    let (scanner, atlas) = (ns(1.0, 9.0), ns(1.12, 9.0));
+    // Rows of the sform, its code, the qform's, pixdim; then the edge along i, the place of voxel 0
+    // along x and the start of the fact.
+    let two = [2.0, 2.0, 2.0];
+    let unit = [[1.0, 0.0, 0.0, 9.0], [0.0, 1.0, 0.0, 9.0], [0.0, 0.0, 1.0, 9.0]];
+    for (rows, codes, edges, (edge, x, taken)) in [
+        (atlas, (4, 1), [1.0, 1.0, 2.0], (1.0, 1.0, "qform, code 1 (scanner), since the sform, code 4 (MNI)")),
+        (atlas, (3, 2), [1.0, 1.0, 2.0], (1.0, 1.0, "qform, code 2")),
+        (atlas, (2, 1), [1.12, 1.12, 2.24], (1.12, 9.0, "sform, code 2")),
+        (atlas, (4, 4), [1.0, 1.0, 2.0], (1.12, 9.0, "sform, code 4")),
+        (atlas, (4, 0), [1.12, 1.12, 2.24], (1.12, 9.0, "sform, code 4")),
+        (atlas, (1, 0), [1.0, 1.0, 2.0], (1.12, 9.0, "sform, code 1")),
+        (ns(0.0, 0.0), (1, 1), [1.0, 1.0, 2.0], (1.0, 1.0, "qform, code 1")),
+        (ns(f32::NAN, 0.0), (1, 1), [1.0, 1.0, 2.0], (1.0, 1.0, "qform, code 1")),
+        (unit, (1, 0), two, (2.0, 9.0, "sform, code 1 (scanner), scaled by pixdim")),
+        (unit, (1, 1), two, (2.0, 1.0, "qform, code 1")),
+        (scanner, (1, 0), [0.0; 3], (1.0, 9.0, "sform, code 1")),
+        (scanner, (1, 0), [f32::NAN; 3], (1.0, 9.0, "sform, code 1")),
+        (scanner, (1, 1), [0.0; 3], (1.0, 9.0, "sform, code 1")),
+        (scanner, (1, 0), [-1.0, 1.0, 2.0], (1.0, 9.0, "sform, code 1")),
+        (scanner, (0, 1), [-1.0, 1.0, 2.0], (1.0, 1.0, "qform, code 1")),
+        (scanner, (0, 0), [-1.0, 1.0, 2.0], (1.0, 0.5, "none")),
+    ] {
+        let import = File1::new([2, 2, 2], false).srow(rows).forms(codes.0, codes.1, edges).import().unwrap();
+        let fact = &import.facts.iter().find(|(name, _)| *name == "transform").unwrap().1;
+        let found = (import.volume.spacing_mm().x as f32, import.volume.world_from_voxel.translation.x as f32);
+        assert!(found == (edge, x) && fact.starts_with(taken), "{rows:?} {codes:?} {edges:?}: {found:?} {fact}");
+        let plain = rows == scanner && edges[0] == -1.0 && codes.0 == 1 || edges[0] == 1.12 || codes == (4, 4);
+        assert!(plain || !import.notes.is_empty(), "{rows:?} {codes:?} {edges:?} has no remark");
+    }
+}
+
+#[test]
+fn gzip_may_have_several_members_and_zeros_after_them() {
+    let bytes = File1::new([4, 3, 2], false).bytes;
+    let members = [gzipped(&bytes[..370]), gzipped(&bytes[370..]), vec![0; 1000]].concat();
+    assert_eq!(read_bytes("a.nii.gz", &members).unwrap(), read_bytes("a.nii", &bytes).unwrap());
+}
+
+#[test]
+fn a_sheared_volume_is_written_as_nrrd_and_others_as_nifti() {
+    let folder = tempfile::tempdir().unwrap();
+    for (affine, end) in [(sheared(), "nrrd"), (DAffine3::from_scale(DVec3::new(-1.0, 2.0, 3.0)), "nii.gz")] {
+        let volume = VoxelVolume::filled([2, 2, 2], affine, 7i16);
+        let path = write_beside(folder.path(), "drilled", &volume).unwrap();
+        assert_eq!(path, folder.path().join(format!("drilled.{end}")));
+        assert_eq!(read(&path).unwrap(), volume.map(f32::from));
+    }
+    assert!(nrrd::read(&folder.path().join("drilled.nrrd")).is_ok());
 }
 
 #[test]
@@ -240,7 +315,8 @@ fn several_volumes_are_read_by_number_only() {
     file.i16(40, 4).i16(48, 3).bytes.extend([7; 32]);
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), "a.nii", &file.bytes);
-    assert!(matches!(read(&path), Err(ReadError::Volumes { found: 3, .. })));
+    let unchosen = read(&path).unwrap_err().to_string();
+    assert!(unchosen.contains("3 volumes") && unchosen.contains("--mri-series N, from 0"), "{unchosen}");
     let second = nifti::import_volume(&path, 1).unwrap();
     assert_eq!(second.volume.data, [f32::from(0x0707i16); 8]);
     assert_eq!(second.notes, [Note::OneOf { what: "volumes", count: 3, chosen: 1 }]);
@@ -270,8 +346,8 @@ fn sizes_that_no_volume_has_are_refused_before_memory_is_taken() {
 
 #[test]
 fn spacings_and_axes_that_no_scanner_makes_are_refused() {
-    for wrong in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let error = File1::new([2, 2, 2], false).f32(80, wrong).read().unwrap_err();
+    for (wrong, qform) in [(0.0, 0), (0.0, 1), (f32::NAN, 0), (f32::INFINITY, 1)] {
+        let error = File1::new([2, 2, 2], false).forms(0, qform, [wrong, 1.0, 1.0]).read().unwrap_err();
         assert!(matches!(error, ReadError::Spacing { field: "pixdim", .. }), "{error}");
     }
     let flat = [[1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];

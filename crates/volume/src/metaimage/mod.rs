@@ -8,8 +8,8 @@
 //!
 //! # Practice
 //! Reads raw, zlib and text voxels, both byte orders, `HeaderSize` (also -1) and the intensity
-//! function. `AnatomicalOrientation` is ignored: writers disagree about it, and the matrix holds
-//! the same information.
+//! function, and one volume or channel of several by number. `AnatomicalOrientation` is ignored:
+//! writers disagree about it, and the matrix holds the same information.
 //!
 //! # Sources
 //! Kitware, "MetaIO/Documentation", itk.org/Wiki/ITK/MetaIO/Documentation.
@@ -19,13 +19,13 @@
 
 use crate::keys::{Keys, numbers};
 use crate::sample::{ByteOrder, Number, Scale};
-use crate::source::{Source, only};
+use crate::source::{Part, Source};
 use crate::{Format, Import, Note, ReadError, VoxelVolume};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
 
 /// The format.
-pub const FORMAT: Format = Format { name: "MetaImage", file: Path::to_path_buf, starts, import: import_only };
+pub const FORMAT: Format = Format { name: "MetaImage", file: Path::to_path_buf, starts, import: read_one };
 
 fn starts(bytes: &[u8]) -> bool {
     let key: Vec<u8> = bytes.iter().take_while(|&&b| b != b'=').map(u8::to_ascii_lowercase).collect();
@@ -39,23 +39,25 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
 
 /// Reads the volume of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
-    import_source(Source::open(path)?)
+    read_one(path, None)
 }
 
-fn import_only(path: &Path, number: Option<usize>) -> Result<Import, ReadError> {
-    only(path, number)?;
-    import(path)
+fn read_one(path: &Path, number: Option<usize>) -> Result<Import, ReadError> {
+    import_source(Source::open(path)?, number)
 }
 
 /// Reads from a source that starts with the header.
-fn import_source(mut source: Source) -> Result<Import, ReadError> {
+fn import_source(mut source: Source, index: Option<usize>) -> Result<Import, ReadError> {
     let keys = Keys::read(&mut source, "=", |line| line.trim_start().starts_with("ElementDataFile"))?;
     let file = keys.needed(&source, "ElementDataFile")?;
-    let dims = dims(&source, &keys)?;
+    let (dims, (run, of)) = dims(&source, &keys)?;
     let count = source.voxels("DimSize", dims)?;
+    let field = "DimSize or ElementNumberOfChannels";
+    let (part, several) = Part::numbered(source.file(), field, (if run == 1 { 1 } else { count }, of), index)?;
     let (world_from_voxel, note) = orientation(&source, &keys)?;
+    let scale = scale(&source, &keys)?;
     let data = match file.to_ascii_uppercase().as_str() {
-        "LOCAL" => voxels(&mut source, &keys, count)?,
+        "LOCAL" => voxels(&mut source, &keys, (count, part), scale)?,
         "LIST" => {
             return Err(source.field("ElementDataFile", "LIST", "one file must hold all voxels; convert it to .mha"));
         }
@@ -67,14 +69,29 @@ fn import_source(mut source: Source) -> Result<Import, ReadError> {
             ));
         }
         _ => {
-            voxels(&mut Source::open_plain(&source.file().parent().unwrap_or(Path::new("")).join(file))?, &keys, count)?
+            let mut beside = Source::open_plain(&source.file().parent().unwrap_or(Path::new("")).join(file))?;
+            voxels(&mut beside, &keys, (count, part), scale)?
         }
     };
     let volume = source.volume(dims, data, "TransformMatrix", world_from_voxel)?;
-    Ok(Import::new(volume, note.into_iter().collect()))
+    let taken = if note.is_some() { "axes in LPS" } else { "TransformMatrix in LPS" };
+    let scaled = (scale != Scale::NONE).then(|| Note::Unusual {
+        field: "ElementToIntensityFunction",
+        found: scale.to_string(),
+        taken: "applied, as the format defines; ITK programs leave it out, so their values differ",
+    });
+    let facts = vec![
+        ("stored numbers", number(&source, keys.needed(&source, "ElementType")?)?.stored(order(&keys))),
+        ("compression", if yes(&keys, &["CompressedData"]) { "zlib" } else { "none" }.into()),
+        ("unit", "mm".into()),
+        ("transform", taken.into()),
+        ("scale", scale.to_string()),
+    ];
+    Ok(Import { facts, ..Import::new(volume, several.into_iter().chain(note).chain(scaled).collect()) })
 }
 
-fn dims(source: &Source, keys: &Keys) -> Result<[i64; 3], ReadError> {
+/// The sizes, and the runs and number of volumes or channels.
+fn dims(source: &Source, keys: &Keys) -> Result<([i64; 3], (u64, u64)), ReadError> {
     if let Some(kind) = keys.text(&["ObjectType"]).filter(|kind| !kind.eq_ignore_ascii_case("image")) {
         return Err(source.field("ObjectType", format!("{kind:?}"), "only Image is read"));
     }
@@ -83,15 +100,11 @@ fn dims(source: &Source, keys: &Keys) -> Result<[i64; 3], ReadError> {
         numbers(source, "ElementNumberOfChannels", keys.text(&["ElementNumberOfChannels"]).unwrap_or("1"))?;
     let wrong = || ReadError::Dimensions { file: source.file().into(), field: "DimSize", found: format!("{sizes:?}") };
     let (first, rest) = sizes.split_first_chunk::<3>().ok_or_else(wrong)?;
-    let several = rest.iter().map(|&n| n.unsigned_abs()).chain(channels).find(|&n| n != 1);
-    match several {
-        None => Ok(*first),
-        Some(found) => Err(ReadError::Volumes {
-            file: source.file().into(),
-            field: "DimSize or ElementNumberOfChannels",
-            found,
-            remedy: "one must be cut out first: time series and vectors are not read",
-        }),
+    let volumes = rest.iter().try_fold(1u64, |n, &size| u64::try_from(size).ok()?.checked_mul(n));
+    match (channels[..].first().copied().unwrap_or(1), volumes) {
+        (1, Some(volumes @ 1..)) => Ok((*first, (u64::MAX, volumes))),
+        (channels @ 1.., Some(1)) => Ok((*first, (1, channels))),
+        _ => Err(wrong()),
     }
 }
 
@@ -107,13 +120,6 @@ fn orientation(source: &Source, keys: &Keys) -> Result<(DAffine3, Option<Note>),
     let spacing = vector("ElementSpacing", keys.text(&["ElementSpacing", "ElementSize"]).unwrap_or("1 1 1"), 3)?;
     let offset = vector("Offset", keys.text(&["Offset", "Position", "Origin"]).unwrap_or("0 0 0"), 3)?;
     let spacing = DVec3::new(spacing[0], spacing[1], spacing[2]);
-    if !spacing.cmpgt(DVec3::ZERO).all() {
-        return Err(ReadError::Spacing {
-            file: source.file().into(),
-            field: "ElementSpacing",
-            found: spacing.to_string(),
-        });
-    }
     let (matrix3, note) = match keys.text(&["TransformMatrix", "Orientation", "Rotation"]) {
         None => (DMat3::IDENTITY, Some(Note::NoOrientation { field: "no TransformMatrix" })),
         Some(text) => {
@@ -129,22 +135,29 @@ fn orientation(source: &Source, keys: &Keys) -> Result<(DAffine3, Option<Note>),
     Ok((DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0)) * lps, note))
 }
 
-fn voxels(source: &mut Source, keys: &Keys, count: u64) -> Result<Vec<f32>, ReadError> {
-    let yes = |names: &[&str]| keys.text(names).is_some_and(|v| v.eq_ignore_ascii_case("true") || v == "1");
-    let number = number(source, keys.needed(source, "ElementType")?)?;
-    let order = match yes(&["BinaryDataByteOrderMSB", "ElementByteOrderMSB"]) {
+fn yes(keys: &Keys, names: &[&str]) -> bool {
+    keys.text(names).is_some_and(|v| v.eq_ignore_ascii_case("true") || v == "1")
+}
+
+fn order(keys: &Keys) -> ByteOrder {
+    match yes(keys, &["BinaryDataByteOrderMSB", "ElementByteOrderMSB"]) {
         true => ByteOrder::Big,
         false => ByteOrder::Little,
-    };
-    let scale = scale(source, keys)?;
+    }
+}
+
+fn voxels(source: &mut Source, keys: &Keys, (count, part): (u64, Part), scale: Scale) -> Result<Vec<f32>, ReadError> {
+    let number = number(source, keys.needed(source, "ElementType")?)?;
+    let total = count.saturating_mul(part.of);
     if keys.text(&["BinaryData"]).is_some_and(|v| v.eq_ignore_ascii_case("false")) {
-        let mut values = source.written_samples(count)?;
+        let mut values = source.written_samples(total)?;
+        part.keep(&mut values, 0, 0);
         values.iter_mut().for_each(|v| *v = (scale.slope * f64::from(*v) + scale.intercept) as f32);
         return Ok(values);
     }
     let before: Vec<i64> = numbers(source, "HeaderSize", keys.text(&["HeaderSize"]).unwrap_or("0"))?;
     let mut unpacked;
-    let from = match yes(&["CompressedData"]) {
+    let from = match yes(keys, &["CompressedData"]) {
         false => source,
         true => {
             let rest = source.take_rest();
@@ -155,9 +168,9 @@ fn voxels(source: &mut Source, keys: &Keys, count: u64) -> Result<Vec<f32>, Read
     match before.first().map(|&n| u64::try_from(n)) {
         None | Some(Ok(0)) => {}
         Some(Ok(bytes)) => from.skip(bytes, "HeaderSize")?,
-        Some(Err(_)) => from.skip_to_last(count.saturating_mul(number.bytes() as u64))?,
+        Some(Err(_)) => from.skip_to_last(total.saturating_mul(number.bytes() as u64))?,
     }
-    let data = from.samples(count, number, order, scale)?;
+    let data = from.samples(part, count, number, order(keys), scale)?;
     from.check_end()?;
     Ok(data)
 }

@@ -18,7 +18,7 @@ fn zlib(bytes: &[u8]) -> Vec<u8> {
 }
 
 fn parsed(header: &str, voxels: &[u8]) -> Result<Import, ReadError> {
-    import_source(Source::of_bytes(Path::new("a.mha"), [header.as_bytes(), voxels].concat()))
+    import_source(Source::of_bytes(Path::new("a.mha"), [header.as_bytes(), voxels].concat()), None)
 }
 
 #[test]
@@ -48,7 +48,37 @@ fn big_endian_zlib_text_and_header_sizes_are_read() {
     same("BinaryData = True", "BinaryData = False", text.as_bytes());
     let scaled =
         HEADER.replace("NDims", "ElementToIntensityFunctionSlope = 2\nElementToIntensityFunctionOffset = -1\nNDims");
-    assert_eq!(parsed(&scaled, &little).unwrap().volume.data[23], 35.0);
+    let import = parsed(&scaled, &little).unwrap();
+    assert_eq!(import.volume.data[23], 35.0);
+    assert!(import.notes[0].to_string().contains("ITK programs leave it out"), "{:?}", import.notes);
+}
+
+#[test]
+fn volumes_and_channels_are_read_by_number() {
+    let twice = [voxels(ByteOrder::Little), voxels(ByteOrder::Little).iter().map(|_| 7).collect()].concat();
+    let of = |header: &str, number| {
+        import_source(Source::of_bytes(Path::new("a.mha"), [header.as_bytes(), &twice].concat()), number)
+    };
+    let volumes = HEADER
+        .replace("4 3 2", "4 3 2 2")
+        .replace("0 1 0 -1 0 0 0 0 1", "0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1")
+        .replace("0.5 2 3", "0.5 2 3 1")
+        .replace("10 20 30", "10 20 30 0");
+    let channels = HEADER.replace("NDims", "ElementNumberOfChannels = 2\nNDims");
+    assert_eq!(of(&volumes, Some(0)).unwrap().volume, parsed(HEADER, &twice).unwrap().volume);
+    assert_eq!(of(&volumes, Some(1)).unwrap().volume.data, [1799.0; 24]);
+    assert_eq!(of(&channels, Some(1)).unwrap().volume.data[..3], [-4.0, -2.0, 0.0]);
+    for header in [volumes, channels] {
+        assert!(matches!(of(&header, None), Err(ReadError::Volumes { found: 2, .. })));
+        assert!(matches!(of(&header, Some(2)), Err(ReadError::Volumes { found: 2, .. })));
+    }
+}
+
+#[test]
+fn negative_spacings_turn_an_axis_round() {
+    let plain = parsed(HEADER, &voxels(ByteOrder::Little)).unwrap().volume.world_from_voxel;
+    let turned = parsed(&HEADER.replace("0.5 2", "-0.5 2"), &voxels(ByteOrder::Little)).unwrap();
+    assert_eq!(turned.volume.world_from_voxel.matrix3.x_axis, -plain.matrix3.x_axis);
 }
 
 #[test]
@@ -78,10 +108,8 @@ fn each_wrong_field_has_its_own_error() {
     }
     assert!(matches!(wrong("4 3 2", "4 3 0"), ReadError::Dimensions { .. }));
     assert!(matches!(wrong("4 3 2", "4 3"), ReadError::Dimensions { .. }));
-    assert!(matches!(wrong("4 3 2", "4 3 2 5"), ReadError::Volumes { found: 5, .. }));
     assert!(matches!(wrong("4 3 2", "900000 900000 900000"), ReadError::TooLarge { .. }));
     assert!(matches!(wrong("0.5 2 3", "0 2 3"), ReadError::Spacing { .. }));
-    assert!(matches!(wrong("0.5 2 3", "-0.5 2 3"), ReadError::Spacing { .. }));
     assert!(matches!(wrong("0 1 0 -1", "1 0 0 1"), ReadError::Orientation { .. }));
     let cut = zlib(&voxels(ByteOrder::Little));
     let error =
@@ -94,5 +122,5 @@ fn damaged_files_give_errors_and_no_panic() {
     let little = voxels(ByteOrder::Little);
     let packed = HEADER.replace("CompressedData = False", "CompressedData = True");
     let seeds = [[HEADER.as_bytes(), &little].concat(), [packed.as_bytes(), &zlib(&little)].concat()];
-    survives_mutations(&seeds, |bytes| import_source(Source::of_bytes(Path::new("a.mha"), bytes)));
+    survives_mutations(&seeds, |bytes| import_source(Source::of_bytes(Path::new("a.mha"), bytes), None));
 }

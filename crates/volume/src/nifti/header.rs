@@ -13,8 +13,10 @@ pub(super) struct Header {
     pub volumes: u64,
     pub number: Number,
     pub vox_offset: u64,
-    /// `None` for a slope of 0, which means unscaled values.
-    pub scale: Option<Scale>,
+    /// A slope of 0 means unscaled values.
+    pub scale: Scale,
+    /// About a scale that is no number.
+    pub note: Option<Note>,
     pub voxels_elsewhere: bool,
     pixdim: [f64; 4],
     qform_code: i64,
@@ -22,14 +24,16 @@ pub(super) struct Header {
     quaternion: DVec3,
     qoffset: DVec3,
     srow: [[f64; 4]; 3],
-    mm_per_unit: f64,
+    pub mm_per_unit: f64,
 }
 
 /// The affine and the field that it comes from.
 pub(super) struct Orientation {
     pub world_from_voxel: DAffine3,
     pub field: &'static str,
-    pub note: Option<Note>,
+    pub notes: Vec<Note>,
+    /// Which transform, by which code.
+    pub taken: String,
 }
 
 impl Header {
@@ -71,7 +75,8 @@ impl Header {
             volumes: volumes(source, dim)?,
             number: number(source, f.i16(70), f.i16(72))?,
             vox_offset: vox_offset(source, f.f32(108), if voxels_elsewhere { 0 } else { 352 })?,
-            scale: scale(source, f.f32(112), f.f32(116))?,
+            scale: scale(f.f32(112), f.f32(116)),
+            note: scale_note(f.f32(112), f.f32(116)),
             voxels_elsewhere,
             pixdim: std::array::from_fn(|i| f.f32(76 + 4 * i)),
             qform_code: f.i16(252),
@@ -113,7 +118,8 @@ impl Header {
             volumes: volumes(source, dim)?,
             number: number(source, f.i16(12), f.i16(14))?,
             vox_offset: if vox_offset == 0 && !voxels_elsewhere { 544 } else { vox_offset },
-            scale: scale(source, f.f64(176), f.f64(184))?,
+            scale: scale(f.f64(176), f.f64(184)),
+            note: scale_note(f.f64(176), f.f64(184)),
             voxels_elsewhere,
             pixdim: std::array::from_fn(|i| f.f64(104 + 8 * i)),
             qform_code: f.i32(344),
@@ -125,23 +131,83 @@ impl Header {
         })
     }
 
-    /// The affine to RAS+ mm: sform, else qform, else the spacings alone.
+    /// The affine to RAS+ mm, by the policy in the crate's geometry.
     pub fn orientation(&self, source: &Source) -> Result<Orientation, ReadError> {
-        let spacing = DVec3::new(self.pixdim[1], self.pixdim[2], self.pixdim[3]) * self.mm_per_unit;
-        if !(spacing.cmpgt(DVec3::ZERO).all() && spacing.is_finite()) {
-            return Err(ReadError::Spacing { file: source.file().into(), field: "pixdim", found: spacing.to_string() });
-        }
+        let pixdim = DVec3::new(self.pixdim[1], self.pixdim[2], self.pixdim[3]) * self.mm_per_unit;
+        let spacing = pixdim.abs();
+        let sized = spacing.cmpgt(DVec3::ZERO).all() && spacing.is_finite();
+        let qform = (self.qform_code > 0 && sized).then(|| self.qform(spacing));
         if self.sform_code > 0 {
-            let sform = self.sform();
-            crate::source::check_affine(source.file(), "srow_x/y/z", sform)?;
-            let note = (self.qform_code > 0).then(|| self.difference(sform, self.qform(spacing))).flatten();
-            return Ok(Orientation { world_from_voxel: sform, field: "srow_x/y/z", note });
+            return self.by_sform(source, pixdim, qform);
         }
-        if self.qform_code > 0 {
-            return Ok(Orientation { world_from_voxel: self.qform(spacing), field: "quatern_b/c/d", note: None });
+        if !sized {
+            return Err(ReadError::Spacing { file: source.file().into(), field: "pixdim", found: pixdim.to_string() });
         }
-        let note = Some(Note::NoOrientation { field: "qform_code and sform_code are 0" });
-        Ok(Orientation { world_from_voxel: DAffine3::from_scale(spacing), field: "pixdim", note })
+        let negative = unusual("pixdim", pixdim, "the absolute values are taken");
+        let mut notes: Vec<Note> = (pixdim != spacing).then_some(negative).into_iter().collect();
+        if let Some(world_from_voxel) = qform {
+            let taken = format!("qform, {}", name(self.qform_code));
+            return Ok(Orientation { world_from_voxel, field: "quatern_b/c/d", notes, taken });
+        }
+        notes.push(Note::NoOrientation { field: "qform_code and sform_code are 0" });
+        let axes = spacing * DVec3::new(-1.0, 1.0, 1.0);
+        let middle = DVec3::from_array(self.dims.map(|n| (n - 1) as f64 / 2.0));
+        let world_from_voxel = DAffine3 { matrix3: DMat3::from_diagonal(axes), translation: -axes * middle };
+        let taken = "none, so left, front, head around the middle".into();
+        Ok(Orientation { world_from_voxel, field: "pixdim", notes, taken })
+    }
+
+    /// The sform, or the qform where that one is to be preferred.
+    fn by_sform(&self, source: &Source, pixdim: DVec3, qform: Option<DAffine3>) -> Result<Orientation, ReadError> {
+        let sform = self.sform();
+        let edges = [0, 1, 2].map(|axis| sform.matrix3.col(axis).length());
+        let edges = DVec3::from_array(edges);
+        let close = |a: DVec3, b: DVec3| (a - b).abs().cmple(0.01 * b).all();
+        let fits = close(edges, pixdim.abs());
+        let unscaled = !fits
+            && close(edges / self.mm_per_unit, DVec3::ONE)
+            && pixdim.cmpne(DVec3::ZERO).all()
+            && pixdim.is_finite();
+        let by_mm = qform.and_then(|qform| self.difference(sform, qform));
+        let of_atlas = self.sform_code >= 3 && self.qform_code <= 2;
+        let by_qform = |qform, note, why| Orientation {
+            world_from_voxel: qform,
+            field: "quatern_b/c/d",
+            notes: vec![note],
+            taken: format!("qform, {}, since the sform, {}, {why}", name(self.qform_code), name(self.sform_code)),
+        };
+        let by_sform = |sform, notes, why| Orientation {
+            world_from_voxel: sform,
+            field: "srow_x/y/z",
+            notes,
+            taken: format!("sform, {}{why}", name(self.sform_code)),
+        };
+        let flat = crate::source::check_affine(source.file(), "srow_x/y/z", sform);
+        Ok(match (flat, qform, by_mm) {
+            (Err(fault), None, _) => return Err(fault),
+            (Err(_), Some(qform), _) => {
+                let note = unusual("srow_x/y/z", edges, "edges that span no volume, so the qform is taken");
+                by_qform(qform, note, "spans no volume")
+            }
+            (Ok(()), Some(qform), _) if unscaled => {
+                let note = unusual("pixdim", pixdim, "the sform lacks this scale, so the qform is taken");
+                by_qform(qform, note, "lacks the scale")
+            }
+            (Ok(()), Some(qform), Some(by_mm)) if of_atlas => {
+                let note = Note::TwoOrientations { used: "qform", ignored: "sform", by_mm };
+                by_qform(qform, note, "leads to another space")
+            }
+            (Ok(()), None, _) if unscaled => {
+                let note = unusual("pixdim", pixdim, "the sform lacks this scale and is given it; check the size");
+                let scaled = sform.matrix3 * DMat3::from_diagonal(pixdim.abs() / edges);
+                by_sform(DAffine3 { matrix3: scaled, ..sform }, vec![note], ", scaled by pixdim")
+            }
+            (Ok(()), _, by_mm) => {
+                let size = unusual("pixdim", pixdim, "the sform gives other edges, which are taken; check the size");
+                let two = by_mm.map(|by_mm| Note::TwoOrientations { used: "sform", ignored: "qform", by_mm });
+                by_sform(sform, two.into_iter().chain((!fits).then_some(size)).collect(), "")
+            }
+        })
     }
 
     fn sform(&self) -> DAffine3 {
@@ -161,8 +227,8 @@ impl Header {
         DAffine3 { matrix3: DMat3::from_quat(q) * scale, translation: self.qoffset * self.mm_per_unit }
     }
 
-    /// Returns a note if sform and qform place a corner of the volume over 0.1 mm apart.
-    fn difference(&self, sform: DAffine3, qform: DAffine3) -> Option<Note> {
+    /// Largest distance between where sform and qform place a corner of the volume, if over 0.1 mm.
+    fn difference(&self, sform: DAffine3, qform: DAffine3) -> Option<f64> {
         let by_mm = (0..8)
             .map(|corner| {
                 let at = |axis: usize| if corner >> axis & 1 == 0 { 0.0 } else { (self.dims[axis] - 1) as f64 };
@@ -170,7 +236,7 @@ impl Header {
                 sform.transform_point3(p).distance(qform.transform_point3(p))
             })
             .fold(0.0, f64::max);
-        (by_mm > 0.1).then_some(Note::TwoOrientations { used: "sform", ignored: "qform", by_mm })
+        (by_mm > 0.1).then_some(by_mm)
     }
 }
 
@@ -271,16 +337,36 @@ fn vox_offset(source: &Source, offset: f64, least: u64) -> Result<u64, ReadError
     }
 }
 
-fn scale(source: &Source, slope: f64, intercept: f64) -> Result<Option<Scale>, ReadError> {
-    match (slope, intercept) {
-        (0.0, _) => Ok(None),
-        (s, i) if s.is_finite() && i.is_finite() => Ok(Some(Scale { slope, intercept })),
-        _ => Err(source.field(
-            "scl_slope",
-            format!("{slope} with scl_inter {intercept}"),
-            "both must be numbers, or the slope 0",
-        )),
+/// The scale of finite numbers; a slope that is none counts as 0, an intercept as none.
+fn scale(slope: f64, intercept: f64) -> Scale {
+    match slope.is_finite() && slope != 0.0 {
+        true => Scale { slope, intercept: if intercept.is_finite() { intercept } else { 0.0 } },
+        false => Scale::NONE,
     }
+}
+
+fn scale_note(slope: f64, intercept: f64) -> Option<Note> {
+    let found = format!("{slope} with scl_inter {intercept}");
+    let taken = "what is no number is left out of the scale";
+    let field = "scl_slope";
+    (!(slope.is_finite() && intercept.is_finite())).then_some(Note::Unusual { field, found, taken })
+}
+
+fn unusual(field: &'static str, found: DVec3, taken: &'static str) -> Note {
+    Note::Unusual { field, found: format!("{found:.4} mm"), taken }
+}
+
+/// A code of a form with its meaning.
+fn name(code: i64) -> String {
+    let meaning = match code {
+        1 => "scanner",
+        2 => "aligned to another image",
+        3 => "Talairach",
+        4 => "MNI",
+        5 => "another template",
+        _ => "unknown",
+    };
+    format!("code {code} ({meaning})")
 }
 
 /// Millimetres in a unit of `xyzt_units`; unknown units are taken as mm.

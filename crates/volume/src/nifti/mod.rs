@@ -7,10 +7,10 @@
 //!
 //! # Practice
 //! Reads both versions, both byte orders, gzip detected by content, `.nii` or `.hdr` with `.img`,
-//! and every real number type. `sform` takes precedence over `qform`; with neither, i, j, k are
-//! taken as right, front, head, and a note reports it. World units other than mm are converted. NaN
+//! and every real number type. Which transform counts stands in the [crate's](crate) geometry. NaN
 //! voxels stay NaN: [`import`] counts them and [`hounsfield`](crate::hounsfield) rejects them.
-//! Writes version 1, single file, little-endian, both forms, atomically.
+//! Writes version 1, single file, little-endian, both forms, atomically; a sheared volume has no
+//! qform, and [`write_beside`](crate::write_beside) gives it another format.
 //!
 //! # Sources
 //! R. W. Cox et al., "A (sort of) new image data format standard: NIfTI-1", 2004; the NIfTI-1 and
@@ -23,11 +23,11 @@
 mod header;
 mod write;
 
+pub(crate) use write::is_sheared;
 pub use write::write;
 
-use crate::sample::Scale;
-use crate::source::Source;
-use crate::{Format, Import, Note, ReadError, VoxelVolume};
+use crate::source::{Part, Source};
+use crate::{Format, Import, ReadError, VoxelVolume};
 use header::Header;
 use std::path::{Path, PathBuf};
 
@@ -61,11 +61,11 @@ pub fn import_volume(path: &Path, index: usize) -> Result<Import, ReadError> {
 }
 
 fn read_one(path: &Path, index: Option<usize>) -> Result<Import, ReadError> {
-    import_source(Source::open(&header_of_pair(path))?, index.map(|n| n as u64))
+    import_source(Source::open(&header_of_pair(path))?, index)
 }
 
 /// Reads from a source that starts with the header.
-fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadError> {
+fn import_source(mut source: Source, index: Option<usize>) -> Result<Import, ReadError> {
     let header = Header::read(&mut source)?;
     match header.voxels_elsewhere {
         false => voxels(source, &header, index),
@@ -73,21 +73,10 @@ fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadE
     }
 }
 
-fn voxels(mut source: Source, header: &Header, index: Option<u64>) -> Result<Import, ReadError> {
+fn voxels(mut source: Source, header: &Header, index: Option<usize>) -> Result<Import, ReadError> {
     let count = source.voxels("dim", header.dims)?;
-    let mut notes = Vec::new();
-    let index = match index {
-        None if header.volumes == 1 => 0,
-        None => return Err(several(&source, header, "one must be chosen: name its number, or split the file")),
-        Some(index) if index < header.volumes => index,
-        Some(_) => return Err(several(&source, header, "numbers go from 0 to one less")),
-    };
-    if header.volumes > 1 {
-        notes.push(Note::OneOf { what: "volumes", count: header.volumes as usize, chosen: index as usize });
-    }
-    let skipped = index.checked_mul(count).and_then(|n| n.checked_mul(header.number.bytes() as u64));
-    let start = header.vox_offset.saturating_add(skipped.unwrap_or(u64::MAX));
-    let ahead = start.checked_sub(source.taken()).ok_or_else(|| {
+    let (part, note) = Part::numbered(source.file(), "dim", (count, header.volumes), index)?;
+    let ahead = header.vox_offset.checked_sub(source.taken()).ok_or_else(|| {
         source.field(
             "vox_offset",
             header.vox_offset,
@@ -95,19 +84,22 @@ fn voxels(mut source: Source, header: &Header, index: Option<u64>) -> Result<Imp
         )
     })?;
     if ahead > source.left() {
-        return Err(source.field("vox_offset", start, "voxels must start before the end of the file"));
+        return Err(source.field("vox_offset", header.vox_offset, "voxels must start before the end of the file"));
     }
     source.skip(ahead, "bytes before the voxels")?;
-    let data = source.samples(count, header.number, header.order, header.scale.unwrap_or(Scale::NONE))?;
+    let data = source.samples(part, count, header.number, header.order, header.scale)?;
     source.check_end()?;
     let orientation = header.orientation(&source)?;
-    notes.extend(orientation.note);
+    let notes = note.into_iter().chain(header.note.clone()).chain(orientation.notes);
     let volume = source.volume(header.dims, data, orientation.field, orientation.world_from_voxel)?;
-    Ok(Import::new(volume, notes))
-}
-
-fn several(source: &Source, header: &Header, remedy: &'static str) -> ReadError {
-    ReadError::Volumes { file: source.file().into(), field: "dim", found: header.volumes, remedy }
+    let facts = vec![
+        ("stored numbers", header.number.stored(header.order)),
+        ("compression", source.packing()),
+        ("unit", format!("{} mm", header.mm_per_unit)),
+        ("transform", orientation.taken),
+        ("scale", header.scale.to_string()),
+    ];
+    Ok(Import { facts, ..Import::new(volume, notes.collect()) })
 }
 
 /// The header's path if the user named the voxel file of a pair.

@@ -10,6 +10,8 @@ use std::path::Path;
 const HEADER: usize = 352;
 
 /// Writes a volume atomically: `.nii` uncompressed, `.nii.gz` compressed.
+///
+/// ITK programs do not open a sheared volume (see [`write_beside`](crate::write_beside)).
 pub fn write<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<(), WriteError> {
     let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let header = header(path, volume)?;
@@ -54,8 +56,7 @@ fn header<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<[u8; HEADER
 /// Writes the sform; also the qform where it can represent the same affine.
 fn put_orientation(h: &mut [u8; HEADER], affine: DAffine3) {
     let m = affine.matrix3;
-    let spacing = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
-    let qfac = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let (spacing, qfac, turn) = parts(m);
     for (n, size) in [qfac, spacing[0], spacing[1], spacing[2]].iter().enumerate() {
         put(h, 76 + 4 * n, (*size as f32).to_le_bytes());
     }
@@ -65,8 +66,7 @@ fn put_orientation(h: &mut [u8; HEADER], affine: DAffine3) {
             put(h, 280 + 16 * row + 4 * column, (value as f32).to_le_bytes());
         }
     }
-    let turn = DMat3::from_cols(m.x_axis / spacing[0], m.y_axis / spacing[1], qfac * m.z_axis / spacing[2]);
-    if (turn * turn.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6) {
+    if is_rotation(turn) {
         let q = DQuat::from_mat3(&turn);
         let q = if q.w < 0.0 { -q } else { q };
         put(h, 252, 1i16.to_le_bytes());
@@ -76,6 +76,22 @@ fn put_orientation(h: &mut [u8; HEADER], affine: DAffine3) {
             put(h, 256 + 4 * n, (*value as f32).to_le_bytes());
         }
     }
+}
+
+/// Edges, the sign of the third axis, and the rest of a matrix: a rotation unless it is sheared.
+fn parts(m: DMat3) -> ([f64; 3], f64, DMat3) {
+    let spacing = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
+    let qfac = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+    (spacing, qfac, DMat3::from_cols(m.x_axis / spacing[0], m.y_axis / spacing[1], qfac * m.z_axis / spacing[2]))
+}
+
+fn is_rotation(turn: DMat3) -> bool {
+    (turn * turn.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6)
+}
+
+/// Whether the axes are not at right angles, as in a stack of a tilted gantry.
+pub(crate) fn is_sheared(affine: DAffine3) -> bool {
+    !is_rotation(parts(affine.matrix3).2)
 }
 
 fn put<const N: usize>(h: &mut [u8; HEADER], at: usize, bytes: [u8; N]) {

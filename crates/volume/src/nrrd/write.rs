@@ -1,7 +1,7 @@
 //! NRRD with the header attached.
 
 use crate::atomic::{write_atomically, write_voxels};
-use crate::{Number, Sample, VoxelVolume, WriteError};
+use crate::{Sample, VoxelVolume, WriteError};
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use std::path::Path;
@@ -32,25 +32,10 @@ fn header<T: Sample>(volume: &VoxelVolume<T>) -> String {
         "NRRD0004\n# Written by Trepan\ntype: {}\ndimension: 3\nspace: right-anterior-superior\nsizes: {nx} {ny} {nz}\n\
          space directions: {} {} {}\nkinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nendian: little\nencoding: gzip\n\
          space origin: {}\n\n",
-        type_name(T::NUMBER),
+        T::NUMBER.name(),
         vector(m.x_axis),
         vector(m.y_axis),
         vector(m.z_axis),
         vector(volume.world_from_voxel.translation),
     )
-}
-
-fn type_name(number: Number) -> &'static str {
-    match number {
-        Number::U8 => "uint8",
-        Number::I8 => "int8",
-        Number::U16 => "uint16",
-        Number::I16 => "int16",
-        Number::U32 => "uint32",
-        Number::I32 => "int32",
-        Number::U64 => "uint64",
-        Number::I64 => "int64",
-        Number::F32 => "float",
-        Number::F64 => "double",
-    }
 }
