@@ -27,6 +27,7 @@ mod keys;
 mod list;
 mod memory;
 pub mod metaimage;
+pub mod mgh;
 #[cfg(test)]
 mod mutation;
 pub mod nifti;

@@ -6,11 +6,11 @@
 
 use crate::format::Format;
 use crate::source::Source;
-use crate::{Import, ReadError, Sample, VoxelVolume, WriteError, dicom, metaimage, nifti, nrrd};
+use crate::{Import, ReadError, Sample, VoxelVolume, WriteError, dicom, metaimage, mgh, nifti, nrrd};
 use std::path::{Path, PathBuf};
 
 /// The formats that are read.
-pub const FORMATS: &[Format] = &[nifti::FORMAT, nrrd::FORMAT, metaimage::FORMAT, dicom::FORMAT];
+pub const FORMATS: &[Format] = &[nifti::FORMAT, nrrd::FORMAT, metaimage::FORMAT, mgh::FORMAT, dicom::FORMAT];
 
 /// Bytes of a file in which its format is recognised.
 const START: usize = 512;
