@@ -38,7 +38,7 @@ const KEPT: [(&str, &[&str]); 8] = [
 /// Words in the sources that only some crates may use (tests and examples are free).
 const WORDS: [(&str, &[&str]); 6] = [
     ("Instant::now", &["simulator", "trials", "gpu", "render", "emulators"]),
-    ("SystemTime", &["simulator", "trials"]),
+    ("SystemTime", &["link", "simulator", "trials"]),
     ("thread::sleep", &["simulator", "trials", "emulators"]),
     ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
     ("std::fs", &["volume", "mesh", "link", "haptics", "render", "simulator", "trials", "emulators"]),

@@ -41,6 +41,20 @@ pub enum LinkError {
         /// The file.
         path: PathBuf,
     },
+    /// A chunk is compressed in a way that is not read.
+    #[error("{}: its chunks are compressed by {found:?}, which is not read; write it again with lz4, zstd or no compression, as `mcap compress` does", path.display())]
+    Compression {
+        /// The file.
+        path: PathBuf,
+        /// The name of the compression.
+        found: String,
+    },
+    /// No tick of a file can be saved.
+    #[error("no tick of {} can be saved, so nothing was written; fetch the file again, or a copy of it", path.display())]
+    NothingToSave {
+        /// The file.
+        path: PathBuf,
+    },
     /// A repair would overwrite its input.
     #[error("cannot repair {} onto itself; give the repaired file another name", path.display())]
     SameFile {

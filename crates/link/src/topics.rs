@@ -28,9 +28,11 @@ use crate::protobuf::{decode, encode};
 use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
 use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::port::subscriber::Subscriber as SubscriberPort;
+use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::marker::PhantomData;
+use std::time::SystemTime;
 
 /// Longest message, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 4096;
@@ -107,7 +109,7 @@ pub struct Session {
 
 /// Publishes one kind of record.
 pub struct Publisher<T> {
-    port: Port<Service, [u8], ()>,
+    port: Port<Service, [u8], u64>,
     bytes: Vec<u8>,
     session: String,
     record: PhantomData<fn(T)>,
@@ -115,7 +117,7 @@ pub struct Publisher<T> {
 
 /// Receives one kind of record.
 pub struct Subscriber<T> {
-    port: SubscriberPort<Service, [u8], ()>,
+    port: SubscriberPort<Service, [u8], u64>,
     garbled: u64,
     record: PhantomData<fn() -> T>,
 }
@@ -142,19 +144,21 @@ impl Session {
         Ok(Publisher { port, bytes: Vec::with_capacity(512), session: self.name.clone(), record: PhantomData })
     }
 
-    /// Creates a subscriber to `T`, starting with the newest message if there is one.
+    /// Creates a subscriber to `T`. It gets the newest message from before when its publisher next
+    /// sends or greets.
     pub fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, TopicError> {
         let port = self.topic::<T>()?.subscriber_builder().create();
         let port = port.map_err(|error| failed("subscribe", &self.name, &error))?;
         Ok(Subscriber { port, garbled: 0, record: PhantomData })
     }
 
-    fn topic<T: Topic>(&self) -> Result<PortFactory<Service, [u8], ()>, TopicError> {
+    fn topic<T: Topic>(&self) -> Result<PortFactory<Service, [u8], u64>, TopicError> {
         let name = format!("trepan/{}/{}", self.name, T::TOPIC);
         let name = ServiceName::new(&name).map_err(|_| TopicError::Name { name: self.name.clone() })?;
         self.node
             .service_builder(&name)
             .publish_subscribe::<[u8]>()
+            .user_header::<u64>()
             .enable_safe_overflow(true)
             .history_size(1)
             .subscriber_max_buffer_size(BUFFER)
@@ -175,34 +179,49 @@ impl<T: Topic> Publisher<T> {
             return Err(TopicError::TooLong { bytes: self.bytes.len(), topic: T::TOPIC });
         }
         let failed = |error: &dyn std::fmt::Debug| failed("publish", &self.session, error);
-        let sample = self.port.loan_slice_uninit(self.bytes.len()).map_err(|error| failed(&error))?;
+        let mut sample = self.port.loan_slice_uninit(self.bytes.len()).map_err(|error| failed(&error))?;
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        *sample.user_header_mut() = now.map_or(0, |since| since.as_nanos() as u64);
         sample.write_from_slice(&self.bytes).send().map_err(|error| failed(&error))?;
         Ok(())
+    }
+
+    /// Sends the newest message to subscribers that joined since. Call it now and then where
+    /// messages are rare.
+    pub fn greet(&self) -> Result<(), TopicError> {
+        self.port.update_connections().map_err(|error| failed("greet", &self.session, &error))
     }
 }
 
 impl<T: Topic> Subscriber<T> {
-    /// Receives the oldest message.
+    /// Receives a publisher's oldest message; several publishers are emptied one after the other.
     pub fn receive(&mut self) -> Result<Option<T>, TopicError> {
+        Ok(self.receive_sent()?.map(|(_, record)| record))
+    }
+
+    /// Receives a message with the time at which it was sent, ns since 1970.
+    fn receive_sent(&mut self) -> Result<Option<(u64, T)>, TopicError> {
         while let Some(sample) = self.port.receive().map_err(|error| failed("receive", T::TOPIC, &error))? {
             match decode(&sample) {
-                Some(record) => return Ok(Some(record)),
+                Some(record) => return Ok(Some((*sample.user_header(), record))),
                 None => self.garbled += 1,
             }
         }
         Ok(None)
     }
 
-    /// Receives the newest message, if one arrived since the last call.
+    /// Receives the message that was sent last, by any publisher, if one arrived since the last
+    /// call.
     pub fn newest(&mut self) -> Result<Option<T>, TopicError> {
-        let mut newest = None;
-        for _ in 0..=BUFFER {
-            match self.receive()? {
-                Some(record) => newest = Some(record),
+        let mut newest: Option<(u64, T)> = None;
+        for _ in 0..MAX_MEMBERS * (BUFFER + 1) {
+            match self.receive_sent()? {
+                Some(sent) if newest.as_ref().is_none_or(|newest| sent.0 >= newest.0) => newest = Some(sent),
+                Some(_) => {}
                 None => break,
             }
         }
-        Ok(newest)
+        Ok(newest.map(|(_, record)| record))
     }
 
     /// Number of invalid messages, for example from another version.

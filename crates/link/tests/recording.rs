@@ -192,7 +192,7 @@ fn a_repaired_file_is_whole_and_holds_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let (cut, repaired) = (folder.path().join("cut.mcap"), folder.path().join("repaired.mcap"));
     let whole = file(450);
-    for length in [whole.len(), whole.len() * 3 / 4, whole.len() / 2, offset_of(6, &whole) + 20] {
+    for length in [whole.len(), whole.len() * 3 / 4, whole.len() / 2] {
         std::fs::write(&cut, &whole[..length]).unwrap();
         let before = Recording::open(&cut).unwrap();
         let report = repair(&cut, &repaired).unwrap();
@@ -210,6 +210,72 @@ fn a_repaired_file_is_whole_and_holds_the_same() {
         assert_eq!(repair(&repaired, &cut).unwrap(), Repaired { was_whole: true, ..report });
     }
     assert!(repair(&repaired, &repaired).unwrap_err().to_string().contains("another name"));
+    std::fs::remove_file(&repaired).unwrap();
+    std::fs::write(&cut, &whole[..offset_of(6, &whole) + 20]).unwrap();
+    let none = repair(&cut, &repaired).unwrap_err().to_string();
+    assert!(none.contains("no tick") && none.contains("nothing was written") && !repaired.exists(), "{none}");
+}
+
+/// A recording written again with another compression, as other programs do it.
+fn recompressed(bytes: &[u8], compression: Option<mcap::Compression>) -> Vec<u8> {
+    use mcap::records::Record;
+    let options = mcap::WriteOptions::new().compression(compression).chunk_size(Some(64 << 10));
+    let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
+    for record in mcap::read::ChunkFlattener::new(bytes).unwrap() {
+        match record.unwrap() {
+            Record::Schema { header, data } => {
+                writer.add_schema_with_id(header.id, &header.name, &header.encoding, &data).unwrap();
+            }
+            Record::Channel(c) => {
+                writer.add_channel_with_id(c.id, c.schema_id, &c.topic, &c.message_encoding, &c.metadata).unwrap();
+            }
+            Record::Message { header, data } => writer.write_to_known_channel(&header, &data).unwrap(),
+            Record::Metadata(metadata) => writer.write_metadata(&metadata).unwrap(),
+            Record::DataEnd(_) => break,
+            _ => {}
+        }
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+#[test]
+fn recordings_of_every_compression_are_read_and_repaired_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let (from, to) = (folder.path().join("damaged.mcap"), folder.path().join("repaired.mcap"));
+    for compression in [None, Some(mcap::Compression::Lz4), Some(mcap::Compression::Zstd)] {
+        let other = recompressed(&file(1000), compression);
+        let read = open(&other).unwrap();
+        assert_eq!((read.damage, read.ticks.len(), read.indexed), (None, 1000, true), "{compression:?}");
+        assert!(read.ticks.iter().enumerate().all(|(n, t)| bits(t) == bits(&tick(n as u64))));
+        let mut bytes = other.clone();
+        damage_chunk(&mut bytes, 1);
+        std::fs::write(&from, &bytes).unwrap();
+        assert!(!repair(&from, &to).unwrap().was_whole);
+        let (before, after) = (open(&bytes).unwrap().ticks.len(), Recording::open(&to).unwrap().ticks.len());
+        assert!(after > before && after < 1000, "{compression:?}: {before} ticks before the damage, {after} saved");
+    }
+}
+
+#[test]
+fn an_unknown_compression_is_named() {
+    let other = recompressed(&file(450), Some(mcap::Compression::Zstd));
+    let name = b"\x04\0\0\0zstd";
+    let places: Vec<usize> = (0..other.len() - 8).filter(|&at| other[at..at + 8] == *name).collect();
+    let mut bytes = other.clone();
+    places.iter().for_each(|at| bytes[at + 4..at + 8].copy_from_slice(b"brot"));
+    let fault = open(&bytes).unwrap_err();
+    assert!(matches!(&fault, LinkError::Compression { found, .. } if found == "brot"), "{fault}");
+    assert!(fault.to_string().contains("mcap compress"), "{fault}");
+    // One name alone is damage: the rest can be saved.
+    let mut damaged = other;
+    damaged[places[0] + 4] = b'x';
+    let folder = tempfile::tempdir().unwrap();
+    let (from, to) = (folder.path().join("damaged.mcap"), folder.path().join("repaired.mcap"));
+    std::fs::write(&from, &damaged).unwrap();
+    assert!(open(&damaged).unwrap().damage.is_some());
+    repair(&from, &to).unwrap();
+    assert!(Recording::open(&to).unwrap().ticks.len() > 100);
 }
 
 #[test]

@@ -130,3 +130,34 @@ fn names_and_lengths_are_checked() {
     events.send(&event).unwrap();
     assert_eq!(received.receive().unwrap(), Some(event));
 }
+
+#[test]
+fn a_late_subscriber_gets_the_newest_message_when_it_is_greeted() {
+    let session = Session::join(&session_name("late")).unwrap();
+    let mut events = session.publisher::<EventRecord>().unwrap();
+    let event = |tick| EventRecord { tick, kind: "marker".into(), ..EventRecord::default() };
+    let mut early = session.subscriber::<EventRecord>().unwrap();
+    (1..=3).for_each(|tick| events.send(&event(tick)).unwrap());
+    let mut late = session.subscriber::<EventRecord>().unwrap();
+    events.greet().unwrap();
+    assert_eq!((late.newest().unwrap(), early.newest().unwrap()), (Some(event(3)), Some(event(3))));
+    events.greet().unwrap();
+    assert_eq!((late.newest().unwrap(), early.newest().unwrap()), (None, None));
+}
+
+#[test]
+fn the_newest_of_two_publishers_is_the_one_sent_last() {
+    let session = Session::join(&session_name("two")).unwrap();
+    let mut watcher = session.subscriber::<TickRecord>().unwrap();
+    let mut publishers = [0, 1].map(|_| session.publisher::<TickRecord>().unwrap());
+    for (tick, by) in [(1, 0), (2, 1), (3, 0), (4, 1), (5, 0)] {
+        publishers[by].send(&TickRecord { tick, ..TickRecord::default() }).unwrap();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(watcher.newest().unwrap().map(|t| t.tick), Some(5));
+    for tick in 6..600 {
+        publishers[tick as usize % 2].send(&TickRecord { tick, ..TickRecord::default() }).unwrap();
+    }
+    assert_eq!(watcher.newest().unwrap().map(|t| t.tick), Some(599));
+    assert!(watcher.newest().unwrap().is_none(), "all messages of both are taken");
+}

@@ -6,10 +6,26 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// Largest unpacked chunk that is read; the recorder's have 256 KiB plus one record.
 const MAX_CHUNK_BYTES: u64 = 16 << 20;
 
-/// Limit of the unpacked size of all chunks in a file of `length` bytes: recordings shrink about
-/// threefold under LZ4, whose format allows 255-fold.
+/// Limit of the unpacked size of all chunks in a file of `length` bytes.
+///
+/// Recordings shrink about threefold under LZ4 and fourfold under zstd, whose formats allow more.
 pub(super) fn budget(length: usize) -> u64 {
     (length as u64).saturating_mul(32).max(MAX_CHUNK_BYTES)
+}
+
+/// Compressions that are read; MCAP defines no others.
+const COMPRESSIONS: [&str; 3] = ["", "lz4", "zstd"];
+
+/// The compression that a chunk names, if it is none that is read.
+pub(super) fn foreign_compression<'a>(chunk: &Record<'a>) -> Option<&'a str> {
+    Cursor(chunk.body).compression().filter(|name| !COMPRESSIONS.contains(name))
+}
+
+/// Whether a record may be a chunk that is read, by its header.
+pub(super) fn is_likely(record: &Record<'_>) -> bool {
+    record.opcode == mcap::records::op::CHUNK
+        && Cursor(record.body).chunk_size().is_some_and(|size| size <= MAX_CHUNK_BYTES)
+        && Cursor(record.body).packed().is_some_and(|(name, whole)| whole && COMPRESSIONS.contains(&name))
 }
 
 /// Calls `each` with opcode and body of the records in a chunk. Returns `None` on any error; `each`

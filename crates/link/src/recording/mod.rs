@@ -44,6 +44,8 @@ pub struct Recording {
     pub repaired: Option<String>,
     /// Whether the file ends with a valid index, which other programs require.
     pub indexed: bool,
+    /// Compression of its last chunk; empty for none.
+    pub compression: String,
 }
 
 impl Recording {
@@ -59,6 +61,11 @@ impl Recording {
         };
         let mut reading = Reading { budget: chunk::budget(bytes.len()), ..Reading::default() };
         let end = reading.walk(body);
+        if let Some(found) =
+            reading.foreign.filter(|_| reading.recording.ticks.is_empty() && repair::next_chunk(body).is_none())
+        {
+            return Err(LinkError::Compression { path: path.to_owned(), found });
+        }
         let Some((format, header)) = reading.header else {
             return Err(LinkError::NoHeader { path: path.to_owned() });
         };
@@ -103,6 +110,8 @@ struct Reading {
     channels: HashMap<u16, Topic>,
     /// Remaining limit of unpacked bytes.
     budget: u64,
+    /// Compression of a chunk that is not read.
+    foreign: Option<String>,
 }
 
 impl Reading {
@@ -118,6 +127,7 @@ impl Reading {
                 op::CHUNK => {
                     let mark = self.recording.mark();
                     if self.chunk(&record).is_none() {
+                        self.foreign = chunk::foreign_compression(&record).map(str::to_owned);
                         self.recording.rewind(mark);
                         return Err(at);
                     }
@@ -132,6 +142,7 @@ impl Reading {
         let mut budget = self.budget;
         chunk::unpack(record, &mut budget, |opcode, body| self.record(opcode, body))?;
         self.budget = budget;
+        self.recording.compression = Cursor(record.body).compression().unwrap_or_default().into();
         Some(())
     }
 

@@ -24,7 +24,8 @@ pub struct Repaired {
     pub was_whole: bool,
 }
 
-/// Copies the valid parts of the recording `from` to the new file `to`, atomically.
+/// Copies the valid parts of the recording `from` to the new file `to`, atomically. A recording of
+/// which no tick can be saved is an error, and nothing is written.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
     let bytes = super::bytes_of(from)?;
     let body = bytes.strip_prefix(mcap::MAGIC).ok_or_else(|| LinkError::NotARecording { path: from.to_owned() })?;
@@ -44,7 +45,11 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
         copy.mcap.write_metadata(&Metadata { name: REPAIR_NAME.to_owned(), metadata }).map_err(failed)?;
     }
     copy.mcap.finish().map_err(failed)?;
-    whole_file(to, &copy.mcap.into_inner().into_inner())?;
+    let copied = copy.mcap.into_inner().into_inner();
+    if Recording::of_bytes(&copied, from)?.ticks.is_empty() {
+        return Err(LinkError::NothingToSave { path: from.to_owned() });
+    }
+    whole_file(to, &copied)?;
     Ok(Repaired { messages: copy.messages, was_whole })
 }
 
@@ -133,16 +138,11 @@ impl Copy {
 
 /// Opcodes of MCAP's records.
 const KNOWN: std::ops::RangeInclusive<u8> = op::HEADER..=op::DATA_END;
-/// Compression field of our chunks: length and text.
-const COMPRESSION: &[u8] = b"\x03\0\0\0lz4";
-/// Bytes of a chunk before it: opcode, length, first and last time, unpacked size, checksum.
-const BEFORE_COMPRESSION: usize = 1 + 8 + 8 + 8 + 8 + 4;
 
 /// The bytes from the next likely start of a chunk.
-fn next_chunk(bytes: &[u8]) -> Option<&[u8]> {
-    let windows = bytes.windows(COMPRESSION.len()).enumerate().skip(BEFORE_COMPRESSION);
-    let mut places = windows.filter(|(_, window)| *window == COMPRESSION).map(|(at, _)| at - BEFORE_COMPRESSION);
-    places.find(|&at| bytes[at] == op::CHUNK).map(|at| &bytes[at..])
+pub(super) fn next_chunk(bytes: &[u8]) -> Option<&[u8]> {
+    let starts = bytes.iter().enumerate().filter(|(_, byte)| **byte == op::CHUNK).map(|(at, _)| &bytes[at..]);
+    starts.into_iter().find(|rest| Cursor(rest).record().is_some_and(|record| chunk::is_likely(&record)))
 }
 
 /// Passes on write errors only; records that contradict others are skipped.

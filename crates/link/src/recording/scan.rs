@@ -144,6 +144,20 @@ impl<'a> Cursor<'a> {
         self.u64()
     }
 
+    /// Name of a chunk's compression; empty for none.
+    pub(super) fn compression(&self) -> Option<&'a str> {
+        // After first and last time, unpacked size and checksum.
+        Cursor(self.0.get(3 * 8 + 4..)?).text()
+    }
+
+    /// A chunk's compression, and whether its records fill the rest of it.
+    pub(super) fn packed(mut self) -> Option<(&'a str, bool)> {
+        let name = self.compression()?;
+        self.take(3 * 8 + 4 + 4 + name.len())?;
+        let records = self.u64()?;
+        Some((name, records == self.0.len() as u64))
+    }
+
     pub(super) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
         let (head, tail) = self.0.split_at_checked(count)?;
         self.0 = tail;

@@ -177,6 +177,8 @@ impl Journal {
         now_ms: f64,
     ) -> Result<(), LinkError> {
         let Some(sharing) = share else { return Ok(()) };
+        // Events are rare: who joins late gets the newest one.
+        _ = sharing.events.greet();
         for (begins, text) in sharing.teacher.receive(now_ms) {
             let text = format!("{}: {text}", if begins { "begins" } else { "ends" });
             tracing::info!("{:7.3} s  teacher: {text}", self.newest.1 * 1e-3);
