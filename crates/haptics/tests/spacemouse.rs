@@ -2,7 +2,7 @@
 //! limits, disconnection.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::spacemouse::{Config, Source, SpaceMouse};
@@ -84,7 +84,9 @@ fn a_knob_for_the_view_has_a_velocity_without_an_end_of_its_way() {
         let twist = bench.knob.velocity(50.0 * f64::from(tick));
         assert!((twist.linear - 0.05 * Vec3::X).length() < 1e-6 && twist.angular.y.abs() > 9e-4, "{twist:?}");
     }
-    assert_eq!(bench.knob.velocity(30_000.0).linear, Vec3::ZERO, "released");
+    assert!(bench.knob.velocity(30_000.0).linear.x > 0.04, "held still, the daemon is silent");
+    bench.send(REST);
+    assert_eq!(bench.knob.velocity(30_001.0).linear, Vec3::ZERO, "released");
 }
 
 #[test]
@@ -122,15 +124,32 @@ fn buttons_are_the_pedal_and_the_next_tool() {
 }
 
 #[test]
-fn a_knob_let_go_or_silent_stops_and_keeps_its_place() {
+fn a_knob_held_still_moves_on_until_it_is_let_go_or_unplugged() {
     let mut bench = Bench::new();
     let pushed = bench.read_while([0, 350, 0, 0, 0, 0, 0, 8], 50).tool;
     bench.send(REST);
     let still = bench.read().tool;
     assert_eq!((still.twist.linear, still.tip()), (Vec3::ZERO, pushed.tip()));
-    bench.read_while([0, 350, 0, 0, 0, 0, 0, 8], 50);
-    let silent = (0..300).map(|_| bench.read().tool).last().unwrap();
-    assert_eq!(silent.twist.linear, Vec3::ZERO, "300 ms without a word");
+    bench.send([0, -300, 0, 0, 0, 0, 0, 16]);
+    let from = bench.read().tool.tip().x;
+    let held = (0..1000).map(|_| bench.read().tool).last().unwrap();
+    let speed = 0.05 * (300.0f32 / 350.0).powi(2);
+    assert!((from - held.tip().x - 1000.0 * speed).abs() < 0.1, "{}", held.tip());
+    bench.send([3, 0, 1, 0, 0, 0, 0, 0]);
+    assert!(bench.read().tool.twist.linear.x < 0.0, "another knob was plugged in");
+    bench.send([3, 1, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(bench.read().tool.twist.linear, Vec3::ZERO, "unplugged");
+}
+
+#[test]
+fn the_answer_about_the_version_is_no_message() {
+    let mut bench = Bench::new();
+    let mut asked = [0; 4];
+    bench.daemon.read_exact(&mut asked).unwrap();
+    bench.daemon.write_all(&asked).unwrap();
+    bench.send([0, 350, 0, 0, 0, 0, 0, 8]);
+    bench.read();
+    assert!((bench.read().tool.twist.linear.x - 0.05).abs() < 1e-5);
 }
 
 #[test]

@@ -5,26 +5,52 @@
 //!            z and rz point away from the user: the daemon's axes are left-handed
 //! 1 press    button
 //! 2 release  button
-//! others     devices, settings: ignored
+//! 3 device   0 added, 1 removed: a removed knob is let go
+//! others     settings: ignored
 //! ```
+//!
+//! The daemon passes on what the kernel says of the knob. A knob of absolute axes reports changes
+//! only, up to 500, so that silence means an unchanged knob; one of relative axes repeats every few
+//! ms while it is pushed, up to 350, and may never report a zero. The system's description of the
+//! knob says which it is; one that it does not describe counts as absolute, of 350.
+//!
+//! The daemon reports that a knob is removed to clients that ask for version 1 of its protocol, by
+//! one integer that it answers with one. A daemon before 1.0 takes that for a sensitivity that is
+//! no number, and ignores it; there the knob's device file says that it is gone.
 
-use super::{Knob, Link};
-use std::io::{self, ErrorKind, Read};
+use super::{FULL_SCALE, Knob, Link, hid};
+use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use trepan_geometry::Vec3;
 
+/// Count that a knob of absolute axes reports at full deflection.
+const ABSOLUTE_SCALE: f32 = 500.0;
 const MESSAGE: usize = 32;
+/// Bytes of the answer to a request for a version.
+const ANSWER: usize = 4;
 const MOTION: i32 = 0;
 const PRESS: i32 = 1;
 const RELEASE: i32 = 2;
+const DEVICE: i32 = 3;
+/// Request for version 1 of the protocol, and its answer.
+const VERSION_1: i32 = 0x7faa_5501;
 
 /// A connection to the daemon.
 pub(super) struct Daemon {
     socket: UnixStream,
     buffer: [u8; MESSAGE],
     filled: usize,
+    /// Device file of the knob, if one is plugged in.
+    file: Option<PathBuf>,
+    /// Whether its axes are absolute, if the system says.
+    absolute: Option<bool>,
+    /// Reads without a message.
+    idle: u32,
 }
+
+/// Reads without a message after which the knob's device file is looked for.
+const IDLE: u32 = 100;
 
 /// Path of the daemon's socket.
 pub(super) fn usual_place() -> PathBuf {
@@ -34,24 +60,45 @@ pub(super) fn usual_place() -> PathBuf {
 impl Daemon {
     /// Connects with non-blocking reads.
     pub(super) fn connect(path: &Path) -> io::Result<Self> {
-        let socket = UnixStream::connect(path)?;
+        let mut socket = UnixStream::connect(path)?;
         socket.set_nonblocking(true)?;
-        Ok(Self { socket, buffer: [0; MESSAGE], filled: 0 })
+        socket.write_all(&VERSION_1.to_ne_bytes())?;
+        let file = hid::find();
+        let absolute = file.as_deref().and_then(hid::is_absolute);
+        Ok(Self { socket, buffer: [0; MESSAGE], filled: 0, file, absolute, idle: 0 })
     }
 }
 
 impl Link for Daemon {
+    fn is_silent_when_held(&self) -> bool {
+        self.absolute != Some(false)
+    }
+
+    fn full_scale(&self) -> f32 {
+        if self.absolute == Some(true) { ABSOLUTE_SCALE } else { FULL_SCALE }
+    }
+
     fn next(&mut self, knob: &mut Knob) -> io::Result<bool> {
         while self.filled < MESSAGE {
-            match self.socket.read(&mut self.buffer[self.filled..]) {
+            if self.filled == ANSWER && self.buffer[..ANSWER] == VERSION_1.to_ne_bytes() {
+                self.filled = 0;
+            }
+            let end = if self.filled < ANSWER { ANSWER } else { MESSAGE };
+            match self.socket.read(&mut self.buffer[self.filled..end]) {
                 Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
                 Ok(count) => self.filled += count,
-                Err(fault) if fault.kind() == ErrorKind::WouldBlock => return Ok(false),
+                Err(fault) if fault.kind() == ErrorKind::WouldBlock => {
+                    self.idle += 1;
+                    if self.idle.is_multiple_of(IDLE) && self.file.as_ref().is_some_and(|file| !file.exists()) {
+                        *knob = Knob::default();
+                    }
+                    return Ok(false);
+                }
                 Err(fault) if fault.kind() == ErrorKind::Interrupted => {}
                 Err(fault) => return Err(fault),
             }
         }
-        self.filled = 0;
+        (self.filled, self.idle) = (0, 0);
         apply(&numbers(&self.buffer), knob);
         Ok(true)
     }
@@ -68,6 +115,7 @@ fn apply(message: &[i32; 8], knob: &mut Knob) {
         MOTION => (knob.push, knob.turn) = (vector(1), vector(4)),
         PRESS => knob.buttons |= bit,
         RELEASE => knob.buttons &= !bit,
+        DEVICE if message[1] != 0 => *knob = Knob::default(),
         _ => {}
     }
 }
@@ -79,7 +127,7 @@ mod tests {
     #[test]
     fn any_message_is_handled() {
         let mut knob = Knob::default();
-        for first in [i32::MIN, -1, 0, 1, 2, 3, 7, i32::MAX] {
+        for first in [i32::MIN, -1, 0, 1, 2, 3, 7, VERSION_1, i32::MAX] {
             for rest in [i32::MIN, -1, 0, 31, 32, i32::MAX] {
                 apply(&[first, rest, rest, rest, rest, rest, rest, rest], &mut knob);
                 assert!(knob.push.is_finite() && knob.turn.is_finite());

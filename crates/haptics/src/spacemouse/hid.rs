@@ -5,7 +5,7 @@
 //! 2  rx ry rz           i16                    older models send the rotation separately
 //! ```
 
-use super::{Knob, Link};
+use super::{FULL_SCALE, Knob, Link};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::OpenOptionsExt;
@@ -34,6 +34,21 @@ pub(super) fn find() -> Option<PathBuf> {
     Some(Path::new("/dev").join(entry.file_name()))
 }
 
+/// Whether the axes of a device file's knob are absolute; `None` if the system does not say.
+pub(super) fn is_absolute(file: &Path) -> Option<bool> {
+    has_absolute_axes(&Path::new("/sys/class/hidraw").join(file.file_name()?).join("device/input"))
+}
+
+fn has_absolute_axes(inputs: &Path) -> Option<bool> {
+    let axes = |folder: &Path, kind: &str| {
+        let text = fs::read_to_string(folder.join("capabilities").join(kind)).unwrap_or_default();
+        text.chars().any(|c| c.is_ascii_hexdigit() && c != '0')
+    };
+    let mut folders = fs::read_dir(inputs).ok()?.flatten().map(|entry| entry.path());
+    let folder = folders.find(|folder| axes(folder, "abs") || axes(folder, "rel"))?;
+    Some(axes(&folder, "abs"))
+}
+
 /// Whether the system's description of a HID device is that of a six-axis knob.
 fn is_knob(uevent: &str) -> bool {
     let id = uevent.lines().find_map(|line| line.strip_prefix("HID_ID=")).unwrap_or_default();
@@ -54,6 +69,14 @@ impl Hid {
 }
 
 impl Link for Hid {
+    fn is_silent_when_held(&self) -> bool {
+        false
+    }
+
+    fn full_scale(&self) -> f32 {
+        FULL_SCALE
+    }
+
     fn next(&mut self, knob: &mut Knob) -> io::Result<bool> {
         let mut report = [0; LONGEST];
         match self.file.read(&mut report) {
@@ -107,6 +130,25 @@ mod tests {
         let expected = Knob { push: Vec3::new(350.0, -256.0, 1.0), turn: Vec3::new(2.0, 350.0, -1.0), buttons: 0 };
         assert_eq!((knob(&[&long]), knob(&old)), (expected, expected));
         assert_eq!(knob(&[&[3, 0x02, 0x01]]).buttons, 0x102);
+    }
+
+    #[test]
+    fn the_kind_of_the_axes_is_what_the_system_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let inputs = folder.path();
+        assert_eq!(has_absolute_axes(inputs), None);
+        let put = |input: &str, abs: &str, rel: &str| {
+            let at = inputs.join(input).join("capabilities");
+            fs::create_dir_all(&at).unwrap();
+            fs::write(at.join("abs"), abs).unwrap();
+            fs::write(at.join("rel"), rel).unwrap();
+        };
+        put("input3", "0\n", "0\n");
+        assert_eq!(has_absolute_axes(inputs), None);
+        put("input4", "0\n", "3f\n");
+        assert_eq!(has_absolute_axes(inputs), Some(false));
+        put("input4", "3f\n", "0\n");
+        assert_eq!(has_absolute_axes(inputs), Some(true));
     }
 
     #[test]

@@ -13,9 +13,10 @@
 //! Reads the spacenav daemon where it runs, else the system's HID reports ([`Config::source`]).
 //! Both are read without waiting, at most 64 messages a tick. The knob's axes become x right, y up,
 //! z to the user; [`Workspace`] maps them to world space. The first button is the pedal, the second
-//! requests the next tool. The knob sends nothing at rest: after 100 ms without a message it counts
-//! as released. A lost knob is [`Status::Lost`] until it is opened again. In the other hand it
-//! turns the view: [`SpaceMouse::velocity`].
+//! requests the next tool. A deflected knob repeats its HID reports, so that there 100 ms without
+//! one count as released. By the daemon a knob of absolute axes is silent while it is held still,
+//! and stays as it was until it is let go or unplugged. A lost knob is [`Status::Lost`] until it is
+//! opened again. In the other hand it turns the view: [`SpaceMouse::velocity`].
 //!
 //! # Sources
 //! spacenavd's protocol (its public documentation), the USB HID reports of 3Dconnexion's devices.
@@ -53,7 +54,7 @@ pub static DEVICE: Descriptor = Descriptor {
 
 /// Count that a knob reports at full deflection.
 const FULL_SCALE: f32 = 350.0;
-/// Silence after which the knob counts as released, ms.
+/// Silence of HID reports after which the knob counts as released, ms.
 const SILENT_MS: f64 = 100.0;
 /// Longest tick that is integrated, ms.
 const MAX_DT_MS: f64 = 100.0;
@@ -115,6 +116,10 @@ struct Knob {
 trait Link: Send {
     /// Processes the next message; `Ok(false)` when none is available.
     fn next(&mut self, knob: &mut Knob) -> io::Result<bool>;
+    /// Whether a knob that is held still sends nothing.
+    fn is_silent_when_held(&self) -> bool;
+    /// Count at full deflection.
+    fn full_scale(&self) -> f32;
 }
 
 /// An open knob.
@@ -124,6 +129,7 @@ pub struct SpaceMouse {
     config: Config,
     knob: Knob,
     heard_ms: f64,
+    full_scale: f32,
     last_ms: Option<f64>,
     position: Vec3,
     tilt: Vec3,
@@ -136,6 +142,7 @@ impl SpaceMouse {
     pub fn open(config: &Config) -> Result<Self, DeviceError> {
         let (link, name) = link(&config.source)?;
         Ok(Self {
+            full_scale: link.full_scale(),
             link: Some(link),
             name,
             config: config.clone(),
@@ -168,7 +175,8 @@ impl SpaceMouse {
                 }
             }
         }
-        if time_ms - self.heard_ms > SILENT_MS {
+        let repeats = self.link.as_ref().is_some_and(|link| !link.is_silent_when_held());
+        if repeats && time_ms - self.heard_ms > SILENT_MS {
             (self.knob.push, self.knob.turn) = (Vec3::ZERO, Vec3::ZERO);
         }
     }
@@ -181,7 +189,7 @@ impl SpaceMouse {
     }
 
     fn set_by_knob(&self) -> Twist {
-        let rate = |counts: Vec3| (counts / FULL_SCALE).clamp(-Vec3::ONE, Vec3::ONE);
+        let rate = |counts: Vec3| (counts / self.full_scale).clamp(-Vec3::ONE, Vec3::ONE);
         let squared = |a: Vec3| a.abs() * a;
         let linear = squared(rate(self.knob.push)) * self.config.speed;
         Twist { linear, angular: squared(rate(self.knob.turn)) * self.config.turning }
