@@ -6,7 +6,9 @@
 
 use crate::format::Format;
 use crate::source::Source;
-use crate::{Import, ReadError, Sample, VoxelVolume, WriteError, dicom, metaimage, mgh, nifti, nrrd};
+use crate::{
+    Import, ReadError, Sample, Segmentation, VoxelVolume, WriteError, dicom, labels, metaimage, mgh, nifti, nrrd,
+};
 use std::path::{Path, PathBuf};
 
 /// The formats that are read.
@@ -45,6 +47,23 @@ pub fn import_among(formats: &[Format], path: &Path, number: Option<usize>) -> R
     let found = foreign(Source::open(path)?.peek(START)?).into();
     let readable = formats.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
     Err(ReadError::Format { file: path.into(), found, readable })
+}
+
+impl Segmentation {
+    /// Reads a label file of any format, without trusting its sizes.
+    ///
+    /// Labels other than whole numbers from 0 to 65535 are an error.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        if dicom::is_segmentation(path) {
+            return dicom::segmentation(path);
+        }
+        let (count, segments) = nrrd::segments(path)?;
+        let layers: Result<_, ReadError> = match count {
+            1 => labels(path, &read(path)?).map(|layer| vec![layer]),
+            _ => (0..count).map(|layer| labels(path, &import_number(path, layer)?.volume)).collect(),
+        };
+        Ok(Self { layers: layers?, segments })
+    }
 }
 
 /// Writes a volume that every common program opens: `NAME.nii.gz`, or `NAME.nrrd` if it is sheared

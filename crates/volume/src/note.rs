@@ -69,6 +69,30 @@ pub enum Note {
         /// Angle between the stack and the slices' normal.
         degrees: f64,
     },
+    /// Padding of the scanner was replaced.
+    #[error("{voxels} voxels outside the scanner's field of view (PixelPaddingValue) are taken as air")]
+    Padded {
+        /// How many.
+        voxels: usize,
+    },
+    /// Positions were rounded by their writer.
+    #[error(
+        "the slices' positions are rounded to the digits they are written with: up to {by_mm:.3} mm off an even line, which is taken"
+    )]
+    Rounded {
+        /// Largest distance from the even line, mm.
+        by_mm: f64,
+    },
+    /// A series was split.
+    #[error(
+        "{chosen} of the {all} pictures of this series are read: the others differ in size, edges, orientation, acquisition, echo, kind or phase, or repeat a place"
+    )]
+    PartOfSeries {
+        /// Pictures that are read.
+        chosen: usize,
+        /// Pictures of the scanner's series.
+        all: usize,
+    },
     /// Files that were skipped.
     #[error("{count} files were passed over: {why}")]
     Skipped {

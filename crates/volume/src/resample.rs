@@ -74,6 +74,21 @@ impl Grid {
     pub fn voxels(&self) -> usize {
         self.dims.iter().fold(1, |n, &d| n.saturating_mul(d))
     }
+
+    /// Centre of the voxel at an index, RAS mm.
+    pub(crate) fn place(&self, at: usize) -> DVec3 {
+        let [nx, ny, _] = self.dims;
+        let voxel = DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
+        self.world_from_voxel.transform_point3(voxel)
+    }
+
+    /// Index of the voxel that holds a point in RAS mm; `None` outside the grid.
+    pub(crate) fn nearest(&self, place: DVec3) -> Option<usize> {
+        let voxel = self.world_from_voxel.inverse().transform_point3(place).round();
+        let [nx, ny, nz] = self.dims.map(|n| n as f64);
+        let held = voxel.cmpge(DVec3::ZERO).all() && voxel.cmplt(DVec3::new(nx, ny, nz)).all();
+        held.then_some((voxel.x + nx * (voxel.y + ny * voxel.z)) as usize)
+    }
 }
 
 /// Samples `from` on `grid`; `outside` fills points beyond it.

@@ -5,13 +5,13 @@
 //! segmentation of 3D Slicer (`.seg.nrrd`) and a DICOM SEG also name their segments; segments that
 //! overlap lie in layers of their own.
 
-use crate::{ReadError, VoxelVolume, import_number, labels, nrrd, read};
-use std::path::Path;
+use crate::VoxelVolume;
+use crate::padding::border_value;
 
 /// Label volumes of one file, and the segments that it names.
 #[derive(Clone, Debug)]
 pub struct Segmentation {
-    /// Label volumes; a segment lies in one of them.
+    /// Label volumes of one grid, at least one; a segment lies in one of them.
     pub layers: Vec<VoxelVolume<u16>>,
     /// Named segments; empty if the file names none.
     pub segments: Vec<Segment>,
@@ -28,15 +28,29 @@ pub struct Segment {
     pub value: u16,
 }
 
+/// Share of neighbours along i that have one value, and the ml that an image shows.
+///
+/// Neighbours that both have the commonest value of the faces do not count. A label volume has 0.6
+/// to 0.98, an MRI under 0.3.
+pub fn flatness(image: &VoxelVolume<f32>) -> (f64, f64) {
+    let background = border_value(image).unwrap_or(f32::NAN);
+    let (mut same, mut pairs, mut shown) = (0usize, 0usize, 0usize);
+    for row in image.data.chunks_exact(image.dims[0].max(1)) {
+        shown += row.iter().filter(|&&v| v != background).count();
+        for pair in row.windows(2).filter(|pair| pair[0] != background || pair[1] != background) {
+            pairs += 1;
+            same += usize::from(pair[0] == pair[1]);
+        }
+    }
+    (same as f64 / pairs.max(1) as f64, shown as f64 * image.voxel_mm3() * 1e-3)
+}
+
 impl Segmentation {
-    /// Reads a label file of any format, without trusting its sizes. Labels that are no whole numbers
-    /// from 0 to 65535 are an error.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
-        let (count, segments) = nrrd::segments(path)?;
-        let layers: Result<_, ReadError> = match count {
-            1 => labels(path, &read(path)?).map(|layer| vec![layer]),
-            _ => (0..count).map(|layer| labels(path, &import_number(path, layer)?.volume)).collect(),
-        };
-        Ok(Self { layers: layers?, segments })
+    /// A mask of the voxels whose layer and value pass; 1 where one does.
+    pub fn mask(&self, holds: impl Fn(usize, u16) -> bool) -> VoxelVolume<u8> {
+        let first = &self.layers[0];
+        let any = |at: usize| self.layers.iter().enumerate().any(|(layer, voxels)| holds(layer, voxels.data[at]));
+        let data = (0..first.data.len()).map(|at| u8::from(any(at))).collect();
+        VoxelVolume { dims: first.dims, data, world_from_voxel: first.world_from_voxel }
     }
 }

@@ -383,7 +383,7 @@ impl Read for Gunzip {
 
 /// Truncates a value for a message to one short line, since the rest of a damaged header may hold
 /// patient data.
-fn shown(found: &str) -> String {
+pub(crate) fn shown(found: &str) -> String {
     found.chars().take_while(|c| !c.is_control() && *c != '\\').take(64).collect()
 }
 

@@ -12,6 +12,9 @@ use crate::{DistanceField, VoxelVolume, largest_component};
 /// Depth under the skin from which there is only brain and CSF, mm.
 const CORE_MM: f32 = 35.0;
 
+/// Depth inside a mask of brain or of the skull's inside from which there is brain, mm.
+const DEEP_MM: f32 = 10.0;
+
 /// Grey-value range of brain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Levels {
@@ -31,6 +34,12 @@ impl Levels {
         }
         let at = |share: f64| signal[(share * (signal.len() - 1) as f64) as usize];
         Some(Self { least: 0.62 * at(0.5), greatest: 1.3 * at(0.9) })
+    }
+
+    /// Computes it from the voxels over 10 mm inside a mask on the MRI's grid.
+    pub fn within(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>) -> Option<Self> {
+        let to_wall = DistanceField::of_mask(mask);
+        Self::of(mri, |at| to_wall.values().data[at] < -DEEP_MM)
     }
 
     pub fn hold(self, value: f32) -> bool {

@@ -36,16 +36,19 @@ mod cavity;
 mod confidence;
 mod fit;
 mod flood;
+mod given;
 mod levels;
 mod morphology;
 
-pub use fit::{BrainFit, brain_by_mri, brain_fit};
+pub use fit::{BrainFit, Hidden, StrayBone, brain_by_mri, brain_fit, leans, stray_bone};
 
 use crate::component::Components;
 use crate::{AIR_HU, DistanceField, FAR_MM, Grid, Interpolation, LEAST_ISOVALUE, OverlapError, VoxelVolume};
 use crate::{TooLarge, largest_component, overlap, resample, room_for_voxels};
 use border::grown;
 pub use confidence::BrainConfidence;
+use given::Given;
+use glam::{DAffine3, DVec3};
 use levels::{Levels, depth_in_head, is_core};
 use morphology::{closed, core, within};
 
@@ -54,6 +57,9 @@ const SHALLOW_MM: f32 = 6.0;
 
 /// Largest fraction of a mask that may lie nearer to the skin than [`SHALLOW_MM`].
 const LEAK: f64 = 0.005;
+
+/// Margin of the working grid around the inside of a skull, mm: wider than the closing's ball.
+const ROOM_MARGIN_MM: f64 = 15.0;
 
 /// Thickness of the tissue's border voxels, which are half CSF, mm.
 const RIM_MM: f32 = 1.0;
@@ -150,6 +156,8 @@ pub struct FoundBrain {
     pub mask: VoxelVolume<u8>,
     /// Its confidence.
     pub confidence: BrainConfidence,
+    /// Whether the MRI shows the brain alone, which then is the mask.
+    pub is_stripped: bool,
 }
 
 /// Segments the brain in a T1 MRI: 1 in the brain, 0 elsewhere, on the MRI's grid. `skull` is a CT
@@ -179,11 +187,14 @@ pub fn find_brain(
     let grid = Grid::isotropic_over(mri, config.work_mm);
     room_for_voxels(grid.voxels() as u64, 32)?;
     room_for_voxels(mri.data.len() as u64, 16)?;
-    let coarse = resample(mri, &grid, Interpolation::Trilinear, 0.0);
-    let room = skull.map(|ct| room(ct, mri, config, &grid)).transpose()?;
-    let brain = match &room {
-        Some(room) => in_room(&coarse, room, config),
-        None => in_head(&coarse, config),
+    let room = skull.map(|ct| room(ct, mri, config, &grid)).transpose()?.map(|room| cropped(&room, ROOM_MARGIN_MM));
+    let grid = room.as_ref().map_or(grid, Grid::of);
+    let Given { coarse, stripped } = Given::of(mri, &grid);
+    let is_stripped = stripped.is_some();
+    let brain = match (stripped, &room) {
+        (Some(brain), _) => Levels::within(&coarse, &brain).map(|levels| (brain, levels)),
+        (None, Some(room)) => in_room(&coarse, room, config),
+        (None, None) => in_head(&coarse, config),
     };
     let nothing = || MaskError::Empty("there is no large piece of one grey value deep in a head");
     let (brain, levels) = brain.ok_or_else(nothing)?;
@@ -196,7 +207,7 @@ pub fn find_brain(
     check_brain_mask(&mask, &doubtful)?;
     let slice_mm = mri.spacing_mm().max_element();
     let confidence = BrainConfidence::of(&brain, &coarse, levels, room.as_ref(), slice_mm, config);
-    Ok(FoundBrain { mask, confidence })
+    Ok(FoundBrain { mask, confidence, is_stripped })
 }
 
 /// The inside of the skull on a grid of cubes.
@@ -211,15 +222,42 @@ fn room(
     cavity::cavity(ct, isovalue, grid).ok_or(MaskError::Empty("the CT's bone encloses nothing"))
 }
 
+/// First and last index of the set voxels along each axis; `None` if none is set.
+fn extent(mask: &VoxelVolume<u8>) -> Option<[[usize; 3]; 2]> {
+    let [nx, ny, _] = mask.dims;
+    let mut found: Option<[[usize; 3]; 2]> = None;
+    for at in (0..mask.data.len()).filter(|&at| mask.data[at] != 0) {
+        let voxel = [at % nx, at / nx % ny, at / (nx * ny)];
+        let [low, high] = found.unwrap_or([voxel; 2]);
+        found = Some(
+            [0, 1].map(|end| [0, 1, 2].map(|a| if end == 0 { low[a].min(voxel[a]) } else { high[a].max(voxel[a]) })),
+        );
+    }
+    found
+}
+
+/// The part of a grid from one voxel to another, inclusive.
+fn part_of(grid: &Grid, [low, high]: [[usize; 3]; 2]) -> Grid {
+    let offset = DAffine3::from_translation(DVec3::from(low.map(|n| n as f64)));
+    Grid { dims: [0, 1, 2].map(|a| high[a] - low[a] + 1), world_from_voxel: grid.world_from_voxel * offset }
+}
+
+/// A mask cropped to its set voxels with a margin, within its grid.
+fn cropped(mask: &VoxelVolume<u8>, margin_mm: f64) -> VoxelVolume<u8> {
+    let Some([low, high]) = extent(mask) else { return mask.clone() };
+    let margin = mask.spacing_mm().to_array().map(|mm| (margin_mm / mm).ceil() as usize);
+    let low = [0, 1, 2].map(|a| low[a].saturating_sub(margin[a]));
+    let high = [0, 1, 2].map(|a| (high[a] + margin[a]).min(mask.dims[a] - 1));
+    resample(mask, &part_of(&Grid::of(mask), [low, high]), Interpolation::Nearest, 0)
+}
+
 fn millilitres(mask: &VoxelVolume<u8>) -> f64 {
     mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.voxel_mm3() * 1e-3
 }
 
 /// Brain inside the skull: voxels of brain's grey values in the room, opened and closed.
 fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig) -> Option<(VoxelVolume<u8>, Levels)> {
-    let to_wall = DistanceField::of_mask(room);
-    let depth = &to_wall.values().data;
-    let levels = Levels::of(mri, |at| depth[at] < -10.0)?;
+    let levels = Levels::within(mri, room)?;
     let tissue = |at: usize| room.data[at] != 0 && levels.hold(mri.data[at]);
     let mut brain = closed(&opened(mri, tissue, config.opening_mm)?, config.closing_mm);
     brain.data.iter_mut().zip(&room.data).for_each(|(brain, room)| *brain &= room);
@@ -269,9 +307,13 @@ fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&Voxel
     let field = DistanceField::of_mask(brain);
     let fine = resample(field.values(), &Grid::of(mri), Interpolation::Trilinear, FAR_MM);
     let mut mask = fine.map(|d| u8::from(d < 0.0));
-    if let Some((ct, isovalue)) = bone {
-        let hu = resample(ct, &Grid::of(mri), Interpolation::Trilinear, AIR_HU);
-        mask.data.iter_mut().zip(&hu.data).for_each(|(m, &hu)| *m &= u8::from(hu < isovalue));
+    if let Some(((ct, isovalue), [low, high])) = bone.zip(extent(&mask)) {
+        let hu = resample(ct, &part_of(&Grid::of(mri), [low, high]), Interpolation::Trilinear, AIR_HU);
+        let rows = (low[2]..=high[2]).flat_map(|k| (low[1]..=high[1]).map(move |j| [low[0], j, k]));
+        for (row, hu) in rows.zip(hu.data.chunks_exact(hu.dims[0])) {
+            let at = mask.index(row);
+            mask.data[at..at + hu.len()].iter_mut().zip(hu).for_each(|(m, &hu)| *m &= u8::from(hu < isovalue));
+        }
     }
     largest_component(&mask)
 }

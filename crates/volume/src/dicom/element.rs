@@ -24,8 +24,10 @@ const DEEPEST: usize = 12;
 /// VRs with a four-byte length after two reserved bytes.
 const LONG: [&[u8; 2]; 12] = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT"];
 
-/// Sequences also parsed in implicit syntax with a given length: functional groups and their parts.
-const SEQUENCES: [Tag; 6] = [0x5200_9229, 0x5200_9230, 0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145];
+/// Sequences also parsed in implicit syntax with a given length: functional groups, segments and
+/// their parts.
+const SEQUENCES: [Tag; 8] =
+    [0x5200_9229, 0x5200_9230, 0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145, 0x0062_0002, 0x0062_000a];
 
 /// Encoding of the elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -216,11 +218,26 @@ impl Element<'_> {
         Some(if self.order == ByteOrder::Big { u16::from_be_bytes(raw) } else { u16::from_le_bytes(raw) })
     }
 
-    /// The numbers of a value of VR DS or IS; empty where one cannot be read.
+    /// The numbers of a value of VR DS or IS, also with decimal commas; empty where one cannot be
+    /// read.
     pub fn numbers(&self) -> Vec<f64> {
-        let text = self.text();
+        let text = self.text().replace(',', ".");
         let numbers: Option<Vec<f64>> = text.split('\\').take(64).map(|part| part.trim().parse().ok()).collect();
         numbers.unwrap_or_default()
+    }
+
+    /// Most decimals that a number of a DS value is written with; many for an exponent.
+    pub fn decimals(&self) -> usize {
+        let of = |part: &str| match part.contains(['e', 'E']) {
+            true => 16,
+            false => part.trim().split_once(['.', ',']).map_or(0, |(_, decimals)| decimals.len()),
+        };
+        self.text().split('\\').map(of).max().unwrap_or(0)
+    }
+
+    /// What numbers are written with of the value, for messages; nothing of a patient passes.
+    pub fn written(&self) -> String {
+        self.text().chars().filter(|c| c.is_ascii_digit() || "+-.,eE\\".contains(*c)).take(80).collect()
     }
 
     /// The value as text without its padding.

@@ -6,17 +6,23 @@ use super::slice::Slice;
 use crate::ReadError;
 use crate::sample::ByteOrder;
 use std::borrow::Cow;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
-/// Appends the values of one frame to `out`.
-pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32>) -> Result<(), ReadError> {
+/// A numerical parameter: what padding becomes in a CT, HU.
+const PADDING_HU: f32 = -1024.0;
+/// A numerical parameter: HU between which padding cannot lie; it would take tissue away.
+const TISSUE_HU: Range<f64> = -900.0..2500.0;
+
+/// Appends the values of one frame to `out`; returns how many were padding, which becomes air in a
+/// CT and 0 in other images.
+pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32>) -> Result<usize, ReadError> {
     let layout = Layout::of(slice)?;
     let field =
         |field, found: &str, remedy| ReadError::Field { file: slice.file.clone(), field, found: found.into(), remedy };
     let missing = || field("PixelData", "missing", "the file holds no picture; fetch it again");
-    let [slope, intercept] = slice.rescale.get(frame).or(slice.rescale.first()).copied().unwrap_or([1.0, 0.0]);
-    let mut add = |stored: i64| out.push((slope * stored as f64 + intercept) as f32);
-    match (slice.pixels.as_ref().ok_or_else(missing)?, slice.syntax.as_str()) {
+    let mut values = Values::of(slice, frame, &layout, out);
+    let mut add = |stored: i64| values.add(stored);
+    let read = match (slice.pixels.as_ref().ok_or_else(missing)?, slice.syntax.as_str()) {
         (Pixels::Plain(range), _) => {
             let needed = layout.frame_bytes();
             let start = range.start.saturating_add(frame.saturating_mul(needed));
@@ -71,6 +77,34 @@ pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32
                 }
             }
             Ok(())
+        }
+    };
+    read.map(|()| values.padded)
+}
+
+/// Values of a frame, and how many of them were padding.
+struct Values<'a> {
+    out: &'a mut Vec<f32>,
+    rescale: [f64; 2],
+    padding: RangeInclusive<i64>,
+    is_ct: bool,
+    padded: usize,
+}
+
+impl<'a> Values<'a> {
+    fn of(slice: &Slice, frame: usize, layout: &Layout, out: &'a mut Vec<f32>) -> Self {
+        let rescale = slice.rescale.get(frame).or(slice.rescale.first()).copied().unwrap_or([1.0, 0.0]);
+        Self { out, rescale, padding: layout.padding(slice.padding), is_ct: slice.modality == "CT", padded: 0 }
+    }
+
+    fn add(&mut self, stored: i64) {
+        let value = self.rescale[0] * stored as f64 + self.rescale[1];
+        let fill = if self.is_ct { PADDING_HU } else { 0.0 };
+        if self.padding.contains(&stored) && !(self.is_ct && TISSUE_HU.contains(&value)) {
+            self.padded += usize::from(value as f32 != fill);
+            self.out.push(fill);
+        } else {
+            self.out.push(value as f32);
         }
     }
 }
@@ -132,14 +166,27 @@ impl Layout {
             let found = format!("{stored} of {allocated} bits, the highest {}", slice.high_bit);
             return field("BitsStored", found, "the stored bits must lie in the allocated ones");
         }
+        // Padding beyond the stored bits takes the others too.
+        let beyond = !slice.signed && slice.padding.iter().flatten().any(|&pad| u64::from(pad) >> stored > 0);
+        let (stored, high_bit) = if beyond { (allocated, allocated - 1) } else { (stored, slice.high_bit) };
         Ok(Self {
             pixels: slice.rows * slice.columns,
             bytes: usize::from(allocated / 8),
             order: if slice.syntax == "1.2.840.10008.1.2.2" { ByteOrder::Big } else { ByteOrder::Little },
             stored: stored.into(),
-            shift: u32::from(slice.high_bit + 1 - stored),
+            shift: u32::from(high_bit + 1 - stored),
             signed: slice.signed,
         })
+    }
+
+    /// The stored values that are padding, of what is written; an empty range for none.
+    fn padding(&self, written: [Option<u16>; 2]) -> RangeInclusive<i64> {
+        let [first, last] = written.map(|value| value.map(|value| self.value(value.into())));
+        match (first, last) {
+            (Some(first), Some(last)) => first.min(last)..=first.max(last),
+            (Some(first), None) => first..=first,
+            (None, _) => i64::MAX..=i64::MAX,
+        }
     }
 
     fn frame_bytes(&self) -> usize {

@@ -34,6 +34,30 @@ pub(super) struct Slice {
     pub spacing: Option<[f64; 2]>,
     /// Slope and intercept: one, or one per frame.
     pub rescale: Vec<[f64; 2]>,
+    /// Whether the file gives a slope and an intercept.
+    pub scaled: [bool; 2],
+    /// Stored values without a picture, as written; the two ends of a range.
+    pub padding: [Option<u16>; 2],
+    /// Decimals of the positions as written.
+    pub decimals: usize,
+    /// What tells repeats of a place apart: acquisition, echo, kind of image, phase. Compared,
+    /// never shown.
+    pub part: [String; 4],
+    /// Echo time and repetition time, ms.
+    pub echo_ms: Option<f64>,
+    pub repetition_ms: Option<f64>,
+    /// Technical words of the descriptions of series and protocol.
+    pub description: String,
+    /// Element whose value does not place a picture, and the value as written.
+    pub wrong: Vec<(&'static str, String)>,
+    /// Element that differs between frames.
+    pub varies: Option<&'static str>,
+    /// Number and label of each segment, of a segmentation.
+    pub segments: Vec<(u16, String)>,
+    /// Segment of each frame.
+    pub segment_of_frame: Vec<u16>,
+    /// Value of a fractional segmentation that means all of a voxel.
+    pub fraction: u16,
     pub pixels: Option<Pixels>,
 }
 
@@ -63,6 +87,7 @@ impl Slice {
         slice.rescale = (0..slopes.len().max(intercepts.len()))
             .map(|n| [slopes.get(n).map_or(1.0, |s| s.1), intercepts.get(n).map_or(0.0, |i| i.1)])
             .collect();
+        slice.scaled = [!slopes.is_empty(), !intercepts.is_empty()];
         Ok(picture.then_some(slice))
     }
 
@@ -71,6 +96,7 @@ impl Slice {
             None => 0,
             Some((0x5200_9229, _)) => 0,
             Some((0x5200_9230, frame)) => frame,
+            Some((0x0062_0002, _)) => return self.keep_segment(found),
             Some(_) => return,
         };
         let first = || found.numbers().first().copied().filter(|v| v.is_finite());
@@ -79,22 +105,185 @@ impl Slice {
             0x0008_0060 => self.modality = code(&found.text(), 2),
             0x0020_000e => self.series = found.text(),
             0x0020_0011 => self.number = first().map(|n| n as i64),
-            0x0020_0032 => self.positions.extend(vector(&found.numbers())),
-            0x0020_0037 => self.orientation = self.orientation.or_else(|| directions(&found.numbers())),
+            0x0008_0008 => self.part[2] = found.text(),
+            0x0008_103e | 0x0018_1030 => self.describe(&found.text()),
+            0x0018_0080 => self.repetition_ms = first(),
+            0x0018_0081 => {
+                self.echo_ms = first();
+                self.part[1] = found.written();
+            }
+            0x0020_0012 => self.part[0] = found.written(),
+            0x0020_0100 => self.part[3] = found.written(),
+            0x0020_0032 => match vector(&found.numbers()) {
+                Some(position) => {
+                    self.decimals = self.decimals.max(found.decimals());
+                    self.positions.push(position);
+                }
+                None => self.wrong.push(("ImagePositionPatient (for every frame)", found.written())),
+            },
+            0x0020_0037 => match (directions(&found.numbers()), self.orientation) {
+                (None, _) => self.wrong.push(("ImageOrientationPatient", found.written())),
+                (new, None) => self.orientation = new,
+                (Some(new), Some(old)) if !alike(new, old) => self.varies = Some("ImageOrientationPatient"),
+                _ => {}
+            },
             0x0028_0002 => self.samples = found.u16().unwrap_or(0),
             0x0028_0008 => self.frames = first().map_or(0, |n| n.clamp(0.0, 1e6) as usize),
             0x0028_0010 => self.rows = found.u16().unwrap_or(0).into(),
             0x0028_0011 => self.columns = found.u16().unwrap_or(0).into(),
-            0x0028_0030 => self.spacing = self.spacing.or_else(|| found.numbers().try_into().ok()),
+            0x0028_0030 => match (edges(&found.numbers()), self.spacing) {
+                (None, _) => self.wrong.push(("PixelSpacing", found.written())),
+                (new, None) => self.spacing = new,
+                (Some(new), Some(old)) if !near(new, old) => self.varies = Some("PixelSpacing"),
+                _ => {}
+            },
             0x0028_0100 => self.bits_allocated = found.u16().unwrap_or(0),
             0x0028_0101 => self.bits_stored = found.u16().unwrap_or(0),
             0x0028_0102 => self.high_bit = found.u16().unwrap_or(0),
             0x0028_0103 => self.signed = found.u16() == Some(1),
+            0x0028_0120 => self.padding[0] = found.u16(),
+            0x0028_0121 => self.padding[1] = found.u16(),
+            0x0062_000b => self.segment_of_frame.extend(found.u16()),
+            0x0062_000e => self.fraction = found.u16().unwrap_or(0),
             0x0028_1052 => intercepts.extend(first().map(|v| (frame, v))),
             0x0028_1053 => slopes.extend(first().map(|v| (frame, v))),
             _ => {}
         }
     }
+}
+
+impl Slice {
+    fn keep_segment(&mut self, found: &Element) {
+        match found.tag {
+            0x0062_0004 => self.segments.push((found.u16().unwrap_or(0), String::new())),
+            0x0062_0005 => {
+                if let Some(segment) = self.segments.last_mut() {
+                    segment.1 = found.text();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds the technical words of a description, which may hold a name otherwise.
+    fn describe(&mut self, text: &str) {
+        for word in text.split(|c: char| !c.is_ascii_alphanumeric()).map(str::to_ascii_lowercase) {
+            if WORDS.contains(&word.as_str()) && !self.description.split(' ').any(|known| known == word) {
+                self.description += if self.description.is_empty() { "" } else { " " };
+                self.description += &word;
+            }
+        }
+    }
+}
+
+/// Words of descriptions that are shown.
+const WORDS: &[&str] = &[
+    "t1",
+    "t1w",
+    "t2",
+    "t2w",
+    "pd",
+    "flair",
+    "mprage",
+    "mp2rage",
+    "spgr",
+    "bravo",
+    "fspgr",
+    "tfe",
+    "tse",
+    "fse",
+    "se",
+    "gre",
+    "vibe",
+    "space",
+    "cube",
+    "3d",
+    "2d",
+    "dwi",
+    "dti",
+    "adc",
+    "trace",
+    "fa",
+    "diffusion",
+    "ep2d",
+    "epi",
+    "bold",
+    "fmri",
+    "swi",
+    "swan",
+    "asl",
+    "perf",
+    "perfusion",
+    "tof",
+    "mra",
+    "cta",
+    "ct",
+    "mr",
+    "pet",
+    "gd",
+    "contrast",
+    "post",
+    "pre",
+    "plain",
+    "native",
+    "ax",
+    "axial",
+    "tra",
+    "cor",
+    "coronal",
+    "sag",
+    "sagittal",
+    "obl",
+    "oblique",
+    "mpr",
+    "mip",
+    "bone",
+    "brain",
+    "soft",
+    "tissue",
+    "head",
+    "skull",
+    "neck",
+    "sinus",
+    "orbit",
+    "stereo",
+    "frame",
+    "thin",
+    "thick",
+    "helical",
+    "volume",
+    "localizer",
+    "localiser",
+    "scout",
+    "topogram",
+    "survey",
+    "loc",
+    "b0",
+    "b1000",
+    "iso",
+    "sharp",
+    "smooth",
+    "kernel",
+    "recon",
+    "h30s",
+    "h60s",
+    "fc",
+    "seg",
+    "segmentation",
+    "tumor",
+    "tumour",
+    "phase",
+    "magnitude",
+];
+
+/// Whether two pairs of directions agree.
+pub(super) fn alike(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
+    (0..2).all(|n| a[n].abs_diff_eq(b[n], 1e-3))
+}
+
+/// Whether two pairs of edges agree to a thousandth, as numbers of few digits do.
+pub(super) fn near(a: [f64; 2], b: [f64; 2]) -> bool {
+    (0..2).all(|n| (a[n] - b[n]).abs() <= 1e-3 * a[n].abs().max(b[n].abs()))
 }
 
 /// Offset and encoding of the first element.
@@ -168,10 +357,25 @@ fn vector(numbers: &[f64]) -> Option<DVec3> {
     <[f64; 3]>::try_from(numbers).ok().map(DVec3::from_array).filter(|v| v.is_finite())
 }
 
+/// Largest difference of a direction's length from 1, and cosine of two: numbers of two digits.
+const ROUNDED: f64 = 0.03;
+
+/// Two directions, made of length 1 and upright to each other.
 fn directions(numbers: &[f64]) -> Option<[DVec3; 2]> {
     let [a, b] = [vector(numbers.get(..3)?)?, vector(numbers.get(3..6)?)?];
-    let upright = a.dot(b).abs() < 1e-3 && (a.length() - 1.0).abs() < 1e-3 && (b.length() - 1.0).abs() < 1e-3;
-    upright.then_some([a, b])
+    let sound = a.dot(b).abs() < ROUNDED && [a, b].iter().all(|v| (v.length() - 1.0).abs() < ROUNDED);
+    let exact = a.dot(b).abs() < 1e-9 && [a, b].iter().all(|v| (v.length() - 1.0).abs() < 1e-9);
+    let row = a.normalize();
+    sound.then(|| if exact { [a, b] } else { [row, (b - b.dot(row) * row).normalize()] })
+}
+
+/// Edges between rows and between columns; one number is both.
+fn edges(numbers: &[f64]) -> Option<[f64; 2]> {
+    match *numbers {
+        [one] => Some([one; 2]),
+        [rows, columns] => Some([rows, columns]),
+        _ => None,
+    }
 }
 
 /// Keeps capital letters only, so that no patient data can pass.

@@ -57,20 +57,17 @@ fn import_source(mut source: Source, index: Option<usize>) -> Result<Import, Rea
     let (world_from_voxel, note) = orientation(&source, &keys)?;
     let scale = scale(&source, &keys)?;
     let data = match file.to_ascii_uppercase().as_str() {
-        "LOCAL" => voxels(&mut source, &keys, (count, part), scale)?,
+        "LOCAL" => voxels(&mut source, &keys, count, part)?,
         "LIST" => {
             return Err(source.field("ElementDataFile", "LIST", "one file must hold all voxels; convert it to .mha"));
         }
         name if name.contains('%') => {
-            return Err(source.field(
-                "ElementDataFile",
-                format!("{file:?}"),
-                "one file must hold all voxels; convert it to .mha",
-            ));
+            let remedy = "one file must hold all voxels; convert it to .mha";
+            return Err(source.field("ElementDataFile", format!("{file:?}"), remedy));
         }
         _ => {
-            let mut beside = Source::open_plain(&source.file().parent().unwrap_or(Path::new("")).join(file))?;
-            voxels(&mut beside, &keys, (count, part), scale)?
+            let beside = source.file().parent().unwrap_or(Path::new("")).join(file);
+            voxels(&mut Source::open_plain(&beside)?, &keys, count, part)?
         }
     };
     let volume = source.volume(dims, data, "TransformMatrix", world_from_voxel)?;
@@ -146,9 +143,9 @@ fn order(keys: &Keys) -> ByteOrder {
     }
 }
 
-fn voxels(source: &mut Source, keys: &Keys, (count, part): (u64, Part), scale: Scale) -> Result<Vec<f32>, ReadError> {
+fn voxels(source: &mut Source, keys: &Keys, count: u64, part: Part) -> Result<Vec<f32>, ReadError> {
     let number = number(source, keys.needed(source, "ElementType")?)?;
-    let total = count.saturating_mul(part.of);
+    let (total, scale) = (count.saturating_mul(part.of), scale(source, keys)?);
     if keys.text(&["BinaryData"]).is_some_and(|v| v.eq_ignore_ascii_case("false")) {
         let mut values = source.written_samples(total)?;
         part.keep(&mut values, 0, 0);
@@ -198,11 +195,8 @@ fn number(source: &Source, name: &str) -> Result<Number, ReadError> {
         "MET_FLOAT" => Number::F32,
         "MET_DOUBLE" => Number::F64,
         _ => {
-            return Err(source.field(
-                "ElementType",
-                format!("{name:?}"),
-                "a number type of MetaImage is right, such as MET_SHORT",
-            ));
+            let remedy = "a number type of MetaImage is right, such as MET_SHORT";
+            return Err(source.field("ElementType", format!("{name:?}"), remedy));
         }
     })
 }

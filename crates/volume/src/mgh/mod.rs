@@ -6,9 +6,9 @@
 //! `world = (Mdc · delta) (voxel - sizes / 2) + Pxyz_c`, in RAS mm.
 //!
 //! # Practice
-//! Reads bytes, shorts (signed or not), ints and floats, and one frame of several by number. Without
-//! `goodRASFlag`, cubes of 1 mm lie left, foot, front, as FreeSurfer takes them, and notes report it.
-//! The footer is ignored.
+//! Reads bytes, shorts (signed or not), ints and floats, and one frame of several by number.
+//! Without `goodRASFlag`, cubes of 1 mm lie left, foot, front, as FreeSurfer takes them, and notes
+//! report it. The footer is ignored.
 //!
 //! # Sources
 //! "The MGH/MGZ Volume Format", surfer.nmr.mgh.harvard.edu/fswiki/FsTutorial/MghFormat.

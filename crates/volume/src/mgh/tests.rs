@@ -81,10 +81,9 @@ fn each_wrong_field_has_its_own_error() {
     assert!(matches!(wrong(4, -4), ReadError::Dimensions { .. }));
     assert!(matches!(wrong(4, 40), ReadError::Truncated { .. }));
     assert!(matches!(wrong(30, 0), ReadError::Spacing { .. }));
-    let name = "a.mgz";
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join(name), gzip(&shorts(1))).unwrap();
-    assert_eq!(crate::import(&folder.path().join(name)).unwrap().facts[0], ("format", FORMAT.name.into()));
+    let path = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(&path, gzip(&shorts(1))).unwrap();
+    assert_eq!(crate::import(path.path()).unwrap().facts[0], ("format", FORMAT.name.into()));
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub(super) struct Header {
     pub vox_offset: u64,
     /// A slope of 0 means unscaled values.
     pub scale: Scale,
-    /// About a scale that is no number.
+    /// About a slope or intercept that is no number.
     pub note: Option<Note>,
     pub voxels_elsewhere: bool,
     pixdim: [f64; 4],
@@ -61,22 +61,20 @@ impl Header {
                 return Err(source.field("magic", "empty", remedy));
             }
             other => {
-                return Err(source.field(
-                    "magic",
-                    text(other),
-                    "a NIfTI-1 header ends in n+1 or ni1; fetch the file again",
-                ));
+                let remedy = "a NIfTI-1 header ends in n+1 or ni1; fetch the file again";
+                return Err(source.field("magic", text(other), remedy));
             }
         };
         let dim: [i64; 8] = std::array::from_fn(|i| f.i16(40 + 2 * i));
-        let header = Self {
+        let (scale, note) = scale(f.f32(112), f.f32(116));
+        Ok(Self {
             order,
             dims: [dim[1], dim[2], dim[3]],
             volumes: volumes(source, dim)?,
             number: number(source, f.i16(70), f.i16(72))?,
             vox_offset: vox_offset(source, f.f32(108), if voxels_elsewhere { 0 } else { 352 })?,
-            scale: scale(f.f32(112), f.f32(116)),
-            note: scale_note(f.f32(112), f.f32(116)),
+            scale,
+            note,
             voxels_elsewhere,
             pixdim: std::array::from_fn(|i| f.f32(76 + 4 * i)),
             qform_code: f.i16(252),
@@ -85,8 +83,7 @@ impl Header {
             qoffset: DVec3::from_array(std::array::from_fn(|i| f.f32(268 + 4 * i))),
             srow: std::array::from_fn(|r| std::array::from_fn(|c| f.f32(280 + 16 * r + 4 * c))),
             mm_per_unit: mm_per_unit(i64::from(bytes[123 - 4])),
-        };
-        Ok(header)
+        })
     }
 
     fn version_2(source: &mut Source, order: ByteOrder) -> Result<Self, ReadError> {
@@ -96,11 +93,8 @@ impl Header {
             b"n+2\0" => false,
             b"ni2\0" => true,
             other => {
-                return Err(source.field(
-                    "magic",
-                    text(other),
-                    "a NIfTI-2 header has n+2 or ni2 there; fetch the file again",
-                ));
+                let remedy = "a NIfTI-2 header has n+2 or ni2 there; fetch the file again";
+                return Err(source.field("magic", text(other), remedy));
             }
         };
         if bytes[4..8] != *b"\r\n\x1a\n" {
@@ -108,6 +102,7 @@ impl Header {
             return Err(source.field("magic", format!("followed by {:?}", &bytes[4..8]), remedy));
         }
         let dim: [i64; 8] = std::array::from_fn(|i| f.i64(16 + 8 * i));
+        let (scale, note) = scale(f.f64(176), f.f64(184));
         let offset = f.i64(168);
         let Ok(vox_offset) = u64::try_from(offset) else {
             return Err(source.field("vox_offset", offset, "it must not be negative"));
@@ -118,8 +113,8 @@ impl Header {
             volumes: volumes(source, dim)?,
             number: number(source, f.i16(12), f.i16(14))?,
             vox_offset: if vox_offset == 0 && !voxels_elsewhere { 544 } else { vox_offset },
-            scale: scale(f.f64(176), f.f64(184)),
-            note: scale_note(f.f64(176), f.f64(184)),
+            scale,
+            note,
             voxels_elsewhere,
             pixdim: std::array::from_fn(|i| f.f64(104 + 8 * i)),
             qform_code: f.i32(344),
@@ -160,14 +155,11 @@ impl Header {
     /// The sform, or the qform where that one is to be preferred.
     fn by_sform(&self, source: &Source, pixdim: DVec3, qform: Option<DAffine3>) -> Result<Orientation, ReadError> {
         let sform = self.sform();
-        let edges = [0, 1, 2].map(|axis| sform.matrix3.col(axis).length());
-        let edges = DVec3::from_array(edges);
+        let edges = DVec3::from_array([0, 1, 2].map(|axis| sform.matrix3.col(axis).length()));
         let close = |a: DVec3, b: DVec3| (a - b).abs().cmple(0.01 * b).all();
         let fits = close(edges, pixdim.abs());
-        let unscaled = !fits
-            && close(edges / self.mm_per_unit, DVec3::ONE)
-            && pixdim.cmpne(DVec3::ZERO).all()
-            && pixdim.is_finite();
+        let sized = pixdim.cmpne(DVec3::ZERO).all() && pixdim.is_finite();
+        let unscaled = !fits && sized && close(edges / self.mm_per_unit, DVec3::ONE);
         let by_mm = qform.and_then(|qform| self.difference(sform, qform));
         let of_atlas = self.sform_code >= 3 && self.qform_code <= 2;
         let by_qform = |qform, note, why| Orientation {
@@ -303,22 +295,16 @@ fn number(source: &Source, datatype: i64, bitpix: i64) -> Result<Number, ReadErr
         1024 => Number::I64,
         1280 => Number::U64,
         128 | 2304 => {
-            return Err(source.field(
-                "datatype",
-                format!("{datatype} (colour)"),
-                "convert the picture to grey values first",
-            ));
+            let remedy = "convert the picture to grey values first";
+            return Err(source.field("datatype", format!("{datatype} (colour)"), remedy));
         }
         32 | 1792 | 2048 => {
             return Err(source.field("datatype", format!("{datatype} (complex)"), "store the magnitude"));
         }
         1536 => return Err(source.field("datatype", "1536 (128-bit float)", "store it as 32-bit float")),
         other => {
-            return Err(source.field(
-                "datatype",
-                other,
-                "2, 4, 8, 16, 64, 256, 512, 768, 1024 or 1280 (real numbers) is right",
-            ));
+            let remedy = "2, 4, 8, 16, 64, 256, 512, 768, 1024 or 1280 (real numbers) is right";
+            return Err(source.field("datatype", other, remedy));
         }
     };
     match bitpix == 8 * number.bytes() as i64 {
@@ -337,19 +323,16 @@ fn vox_offset(source: &Source, offset: f64, least: u64) -> Result<u64, ReadError
     }
 }
 
-/// The scale of finite numbers; a slope that is none counts as 0, an intercept as none.
-fn scale(slope: f64, intercept: f64) -> Scale {
-    match slope.is_finite() && slope != 0.0 {
-        true => Scale { slope, intercept: if intercept.is_finite() { intercept } else { 0.0 } },
-        false => Scale::NONE,
-    }
-}
-
-fn scale_note(slope: f64, intercept: f64) -> Option<Note> {
+/// The scale, and a note if a number is none: such a slope counts as 0, such an intercept as 0.
+fn scale(slope: f64, intercept: f64) -> (Scale, Option<Note>) {
+    let finite = |v: f64| if v.is_finite() { v } else { 0.0 };
+    let scale = match finite(slope) {
+        0.0 => Scale::NONE,
+        slope => Scale { slope, intercept: finite(intercept) },
+    };
     let found = format!("{slope} with scl_inter {intercept}");
-    let taken = "what is no number is left out of the scale";
-    let field = "scl_slope";
-    (!(slope.is_finite() && intercept.is_finite())).then_some(Note::Unusual { field, found, taken })
+    let note = Note::Unusual { field: "scl_slope", found, taken: "what is no number is left out of the scale" };
+    (scale, (!slope.is_finite() || !intercept.is_finite()).then_some(note))
 }
 
 fn unusual(field: &'static str, found: DVec3, taken: &'static str) -> Note {
@@ -358,14 +341,8 @@ fn unusual(field: &'static str, found: DVec3, taken: &'static str) -> Note {
 
 /// A code of a form with its meaning.
 fn name(code: i64) -> String {
-    let meaning = match code {
-        1 => "scanner",
-        2 => "aligned to another image",
-        3 => "Talairach",
-        4 => "MNI",
-        5 => "another template",
-        _ => "unknown",
-    };
+    let names = ["none", "scanner", "aligned to another image", "Talairach", "MNI", "another template"];
+    let meaning = usize::try_from(code).ok().and_then(|code| names.get(code)).unwrap_or(&"unknown");
     format!("code {code} ({meaning})")
 }
 

@@ -54,12 +54,6 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
     read_one(path, None)
 }
 
-/// Reads volume number `index` (from 0) of a file with several: time points, directions, vector
-/// components.
-pub fn import_volume(path: &Path, index: usize) -> Result<Import, ReadError> {
-    read_one(path, Some(index))
-}
-
 fn read_one(path: &Path, index: Option<usize>) -> Result<Import, ReadError> {
     import_source(Source::open(&header_of_pair(path))?, index)
 }

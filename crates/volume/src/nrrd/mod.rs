@@ -26,7 +26,7 @@ pub use write::write;
 
 use crate::keys::{Keys, numbers};
 use crate::sample::{ByteOrder, Number, Scale};
-use crate::source::{Part, Source};
+use crate::source::{Part, Source, shown};
 use crate::{Format, Import, Note, ReadError, VoxelVolume};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
@@ -75,7 +75,7 @@ fn import_source(mut source: Source, number: Option<usize>) -> Result<Import, Re
     let (world_from_voxel, taken) = orientation(&source, &keys, &axes, &mut notes)?;
     let (data, stored) = voxels(&mut source, &keys, count, part)?;
     let volume = source.volume(axes.dims, data, "space directions", world_from_voxel)?;
-    let unit = keys.text(&["space units", "units"]).unwrap_or("mm").into();
+    let unit = shown(keys.text(&["space units", "units"]).unwrap_or("mm"));
     let packing = keys.text(&["encoding"]).unwrap_or_default().into();
     let facts = vec![("stored numbers", stored), ("compression", packing), ("unit", unit), ("transform", taken)];
     Ok(Import { facts, ..Import::new(volume, notes) })
@@ -101,19 +101,14 @@ impl Axes {
         }
         let wrong =
             || ReadError::Dimensions { file: source.file().into(), field: "sizes", found: format!("{sizes:?}") };
-        let kinds: Vec<String> =
-            keys.text(&["kinds"]).unwrap_or_default().split_whitespace().map(str::to_ascii_lowercase).collect();
+        let kinds: Vec<&str> = keys.text(&["kinds"]).unwrap_or_default().split_whitespace().collect();
         let directions: Option<Vec<&str>> = keys.text(&["space directions"]).map(|text| vectors(text).collect());
         // A time axis has a direction without a part in space.
         let in_space =
             |v: &str| v != "none" && v.split(',').take(3).any(|n| n.trim_matches(['(', ' ']).parse::<f64>() != Ok(0.0));
-        let spatial = |axis: &usize| {
-            let of_kind =
-                kinds.get(*axis).is_none_or(|kind| ["domain", "space", "???", "none"].contains(&kind.as_str()));
-            match &directions {
-                Some(directions) => directions.get(*axis).is_some_and(|v| in_space(v)),
-                None => of_kind,
-            }
+        let spatial = |axis: &usize| match &directions {
+            Some(directions) => directions.get(*axis).is_some_and(|v| in_space(v)),
+            None => kinds.get(*axis).is_none_or(|kind| ["domain", "space", "???", "none"].contains(kind)),
         };
         let spatial: Vec<usize> = match sizes.len() {
             3 => vec![0, 1, 2],
@@ -208,11 +203,8 @@ fn millimetres(field: &'static str, keys: &Keys, axis: usize, notes: &mut Vec<No
         "nm" | "nanometer" | "nanometre" => 1e-6,
         "" | "mm" | "millimeter" | "millimetre" | "???" | "none" => 1.0,
         other => {
-            notes.push(Note::Unusual {
-                field,
-                found: other.chars().take(20).collect(),
-                taken: "mm are taken, so check the size",
-            });
+            let found = other.chars().take(20).collect();
+            notes.push(Note::Unusual { field, found, taken: "mm are taken, so check the size" });
             1.0
         }
     }
@@ -224,9 +216,7 @@ fn signs(source: &Source, keys: &Keys, notes: &mut Vec<Note>) -> Result<(DVec3, 
         notes.push(Note::NoOrientation { field });
         Ok((DVec3::ONE, "no patient's space"))
     };
-    let Some(space) = keys.text(&["space"]) else {
-        return unknown("no space");
-    };
+    let Some(space) = keys.text(&["space"]) else { return unknown("no space") };
     match space.to_ascii_lowercase().trim_end_matches("-time") {
         "right-anterior-superior" | "ras" | "rast" => Ok((DVec3::ONE, "RAS")),
         "left-anterior-superior" | "las" | "last" => Ok((DVec3::new(-1.0, 1.0, 1.0), "LAS")),
@@ -283,11 +273,8 @@ fn voxels(source: &mut Source, keys: &Keys, count: u64, part: Part) -> Result<(V
             &mut unpacked
         }
         other => {
-            return Err(from.field(
-                "encoding",
-                format!("{other:?}"),
-                "raw, gzip or text is read; convert the file (unu save -e gzip)",
-            ));
+            let remedy = "raw, gzip or text is read; convert the file (unu save -e gzip)";
+            return Err(from.field("encoding", format!("{other:?}"), remedy));
         }
     };
     let order = match (keys.text(&["endian"]).map(str::to_ascii_lowercase).as_deref(), number.bytes()) {
@@ -308,11 +295,8 @@ fn voxels(source: &mut Source, keys: &Keys, count: u64, part: Part) -> Result<(V
 /// Opens the voxels' file next to a header.
 fn beside(header: &Source, name: &str) -> Result<Source, ReadError> {
     if name.starts_with("LIST") || name.contains('%') {
-        return Err(header.field(
-            "data file",
-            format!("{name:?}"),
-            "one file must hold all voxels; convert it to an attached .nrrd",
-        ));
+        let remedy = "one file must hold all voxels; convert it to an attached .nrrd";
+        return Err(header.field("data file", format!("{name:?}"), remedy));
     }
     let folder = header.file().parent().unwrap_or(Path::new(""));
     Source::open_plain(&folder.join(name))
@@ -341,11 +325,8 @@ fn number(source: &Source, name: &str) -> Result<Number, ReadError> {
         "float" => Number::F32,
         "double" => Number::F64,
         _ => {
-            return Err(source.field(
-                "type",
-                format!("{name:?}"),
-                "a number type of NRRD is right, such as short or float",
-            ));
+            let remedy = "a number type of NRRD is right, such as short or float";
+            return Err(source.field("type", format!("{name:?}"), remedy));
         }
     })
 }

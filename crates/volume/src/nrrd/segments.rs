@@ -1,6 +1,6 @@
 //! Segments of a segmentation that 3D Slicer wrote.
 
-use super::{Axes, header, starts};
+use super::{Axes, header, one, starts};
 use crate::source::Source;
 use crate::{ReadError, Segment};
 use std::collections::BTreeMap;
@@ -33,18 +33,12 @@ pub(super) fn of_source(source: &mut Source) -> Result<(usize, Vec<Segment>), Re
     }
     let mut segments = Vec::new();
     for (number, of) in fields {
-        let whole = |field: &'static str, key: &str, otherwise: usize| match of.get(key) {
-            None => Ok(otherwise),
-            Some(text) => text.parse().map_err(|_| source.field(field, text, "a whole number must stand there")),
-        };
-        let layer = whole("SegmentN_Layer", "layer", if layers > 1 { number } else { 0 })?;
-        let value = whole("SegmentN_LabelValue", "labelvalue", 1)?;
+        let layer = if layers > 1 { number } else { 0 };
+        let layer = of.get("layer").map_or(Ok(layer), |text| one(source, "SegmentN_Layer", text))?;
+        let value = of.get("labelvalue").map_or(Ok(1), |text| one(source, "SegmentN_LabelValue", text))?;
         if layer >= layers {
             return Err(source.field("SegmentN_Layer", layer, "it must be one of the layers that the sizes announce"));
         }
-        let Ok(value) = u16::try_from(value) else {
-            return Err(source.field("SegmentN_LabelValue", value, "it must be a whole number to 65535"));
-        };
         let named = of.get("name").or(of.get("id")).filter(|name| !name.is_empty());
         let name = named.map_or_else(|| format!("Segment_{}", number.saturating_add(1)), |name| name.to_string());
         segments.push(Segment { name, layer, value });

@@ -33,15 +33,14 @@
 //! For two patients, after brain shift, or where the images share only a thin slab.
 
 mod information;
-mod padding;
 mod powell;
 mod pyramid;
 mod trust;
 
+use crate::padding::Padding;
 use crate::{Sample, VoxelVolume};
 use glam::{DAffine3, DQuat, DVec3};
 use information::{Pair, Shared};
-use padding::Padding;
 use powell::{Climb, Pose, climb};
 use pyramid::{Level, middle, range, reduced};
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! One level of an image pyramid in grey-value bins, and the sample points for the comparison.
 
-use super::padding::Padding;
 use crate::component::Components;
+use crate::padding::Padding;
 use crate::resample::corners;
 use crate::{Sample, VoxelVolume};
 use glam::{DAffine3, DVec3, Vec3};

@@ -27,18 +27,21 @@ fn decode_trusting(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let decoded = image.decode(&mut context).map_err(damaged)?;
     match decoded.components() {
         [one] if one.samples().len() == rows * columns => {
-            let shift = sign_shift(bytes);
-            Ok(one.samples().iter().map(|v| (v.round() as i32 - shift) as u16).collect())
+            let (greatest, shift) = range(bytes);
+            // Lossy streams overshoot the range, and the decoder does not clamp.
+            Ok(one.samples().iter().map(|v| ((v.round() as i32).clamp(0, greatest) - shift) as u16).collect())
         }
         _ => Err(CodecError::Wrong("only one component is read")),
     }
 }
 
-/// Offset that the decoder adds to signed values: half the range from the stream's size segment
-/// (SIZ); 0 for unsigned ones.
-fn sign_shift(bytes: &[u8]) -> i32 {
+/// Greatest value of the stream, and the offset that the decoder adds to signed values.
+///
+/// Both follow from the size segment (SIZ); the offset is half the range, 0 for unsigned values.
+fn range(bytes: &[u8]) -> (i32, i32) {
     const START: [u8; 4] = [0xff, 0x4f, 0xff, 0x51];
     let start = bytes.windows(4).position(|window| window == START);
-    let depth = start.and_then(|at| bytes.get(at + 42)).copied().unwrap_or(0);
-    if depth & 0x80 == 0 { 0 } else { 1 << (depth & 15) }
+    let depth = start.and_then(|at| bytes.get(at + 42)).copied().unwrap_or(15);
+    let half = 1 << (depth & 15);
+    (2 * half - 1, if depth & 0x80 == 0 { 0 } else { half })
 }

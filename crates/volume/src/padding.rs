@@ -14,7 +14,7 @@ use std::collections::HashMap;
 const LEAST_SHARE: f64 = 0.05;
 
 /// Padding flag of each voxel, one bit each.
-pub(super) struct Padding(Vec<u64>);
+pub(crate) struct Padding(Vec<u64>);
 
 impl Padding {
     /// Detects padding.
@@ -54,7 +54,7 @@ impl Padding {
 }
 
 /// The most common value on the faces of the image, if common enough.
-fn border_value<T: Sample>(image: &VoxelVolume<T>) -> Option<f32> {
+pub(crate) fn border_value<T: Sample>(image: &VoxelVolume<T>) -> Option<f32> {
     let [nx, ny, nz] = image.dims;
     let mut counts: HashMap<u32, usize> = HashMap::new();
     let mut total = 0;

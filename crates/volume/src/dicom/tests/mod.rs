@@ -5,6 +5,8 @@ use crate::mutation::survives_mutations;
 use glam::{DMat3, DVec3};
 use std::io::Write;
 
+mod kinds;
+
 /// Builds a DICOM file element by element.
 struct Maker {
     bytes: Vec<u8>,
@@ -287,8 +289,9 @@ fn of_several_series_the_largest_is_read_and_others_by_number() {
         std::fs::write(folder.path().join(format!("a{n}")), picture(PLAIN[0], "2", n, position(n))).unwrap();
     }
     let list = series(folder.path()).unwrap();
-    let of = |slices| Series { modality: "CT".into(), number: Some(7), slices, size: SIZE };
-    assert_eq!(list, [of(5), of(3)]);
+    let of = |series: &Series| (series.modality.clone(), series.number, series.slices, series.places, series.size);
+    assert_eq!(list.iter().map(of).collect::<Vec<_>>(), [5, 3].map(|n| ("CT".into(), Some(7), n, n, SIZE)));
+    assert!(list.iter().all(|s| s.direction == "axial" && (s.spacing_mm.unwrap()[2] - 1.25).abs() < 1e-6));
     let largest = import(folder.path()).unwrap();
     assert_eq!(largest.notes, [Note::OneOf { what: "series", count: 2, chosen: 0 }]);
     is_the_stack(&largest.volume, 5);
@@ -348,7 +351,7 @@ fn each_wrong_field_has_its_own_error() {
         let mut slice = Slice::parse(Path::new("a"), &bytes).unwrap().unwrap();
         change(&mut slice);
         let stack = stack::stack(Path::new("a"), &[&slice])?;
-        pixels::frame(&slice, &bytes, 0, &mut Vec::new()).map(|()| stack.pictures.len())
+        pixels::frame(&slice, &bytes, 0, &mut Vec::new()).map(|_| stack.pictures.len())
     };
     assert_eq!(with(&|_| {}).unwrap(), 3);
     let field = |change: &dyn Fn(&mut Slice)| match with(change).unwrap_err() {
@@ -423,11 +426,11 @@ fn run_lengths_unpack_to_exactly_the_pixels() {
 /// One slice uncompressed, as RLE, JPEG-LS and lossless JPEG 2000, and as 8-bit JPEG.
 fn compressed() -> [Vec<u8>; 5] {
     [
-        include_bytes!("../../tests/data/MR_small.dcm").to_vec(),
-        include_bytes!("../../tests/data/MR_small_RLE.dcm").to_vec(),
-        include_bytes!("../../tests/data/MR_small_jpeg_ls_lossless.dcm").to_vec(),
-        include_bytes!("../../tests/data/MR_small_jp2klossless.dcm").to_vec(),
-        include_bytes!("../../tests/data/MR_small_jpeg_baseline.dcm").to_vec(),
+        include_bytes!("../../../tests/data/MR_small.dcm").to_vec(),
+        include_bytes!("../../../tests/data/MR_small_RLE.dcm").to_vec(),
+        include_bytes!("../../../tests/data/MR_small_jpeg_ls_lossless.dcm").to_vec(),
+        include_bytes!("../../../tests/data/MR_small_jp2klossless.dcm").to_vec(),
+        include_bytes!("../../../tests/data/MR_small_jpeg_baseline.dcm").to_vec(),
     ]
 }
 
@@ -455,7 +458,7 @@ fn a_real_slice_has_the_same_numbers_in_every_compression() {
 #[test]
 fn a_jpeg_has_the_values_that_another_decoder_gives() {
     let [.., jpeg] = compressed();
-    let truth = include_bytes!("../../tests/data/MR_small_jpeg_baseline.u8");
+    let truth = include_bytes!("../../../tests/data/MR_small_jpeg_baseline.u8");
     let found = one_picture(jpeg.clone()).unwrap().volume;
     let off = |(a, &b): (&f32, &u8)| (a - f32::from(b)).abs();
     let worst = found.data.iter().zip(truth).map(off).fold(0.0, f32::max);
