@@ -8,6 +8,7 @@ use crate::constants;
 use crate::desk::{self, Done};
 use crate::device_test;
 use crate::ingredients::table;
+use crate::inspect::inspect;
 use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
 use crate::printable::printable;
@@ -116,6 +117,7 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
                 ExitCode::SUCCESS
             })
         }
+        Task::Inspect { path, number, json } => inspect(path, *number, *json),
         Task::Compare { first, second, out } => compare([first, second], out).map(|page| {
             println!("side by side: {}", printable(&page.display().to_string()));
             ExitCode::SUCCESS
@@ -140,9 +142,7 @@ fn list_series(folder: &Path) -> Result<ExitCode, SessionError> {
     }
     println!("the first number is the one that --ct-series and --mri-series take; it counts from 0");
     for (number, series) in found.iter().enumerate() {
-        let [columns, rows] = series.size;
-        let scanner = series.number.map_or_else(String::new, |n| format!(", number {n} at the scanner"));
-        println!("{number}: {}, {} slices of {columns}x{rows}{scanner}", series.modality, series.slices);
+        println!("{number}: {series}");
     }
     Ok(ExitCode::SUCCESS)
 }

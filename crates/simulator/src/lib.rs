@@ -33,6 +33,7 @@ mod error;
 mod force_scale;
 mod hand;
 mod ingredients;
+mod inspect;
 pub mod measure;
 mod mixture;
 mod models;

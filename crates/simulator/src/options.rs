@@ -183,9 +183,9 @@ pub struct Patient {
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
     /// Tissue class from a label volume: white, grey, ventricle, tumour, vessel, basal-ganglia,
-    /// corpus-callosum or soft-tumour; all nonzero voxels inside the brain, or only the codes.
-    /// Repeatable
-    #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
+    /// corpus-callosum or soft-tumour. All nonzero voxels inside the brain, or only the labels
+    /// (codes, names of segments). Repeatable
+    #[arg(long = "tissue", value_name = "CLASS=PATH[:LABEL,...]")]
     pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -223,6 +223,17 @@ pub enum Task {
     /// Check recordings, and repair truncated or damaged ones
     #[command(subcommand)]
     Recording(RecordingTask),
+    /// Print what a reader sees in an image, a DICOM folder, a mesh or a recording, without a case
+    Inspect {
+        /// A file or a folder
+        path: PathBuf,
+        /// Series of a folder or volume of a file, from 0 [default: the one that a program takes]
+        #[arg(long, value_name = "N")]
+        number: Option<usize>,
+        /// Print JSON instead of lines
+        #[arg(long)]
+        json: bool,
+    },
     /// Compare two recorded sessions on one page: scores, warnings, forces
     Compare {
         /// A recording, such as session.mcap

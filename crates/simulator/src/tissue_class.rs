@@ -7,10 +7,10 @@
 
 use crate::error::SessionError;
 use glam::DAffine3;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use trepan_soft::Material;
-use trepan_volume::{Grid, Interpolation, VoxelVolume, resample};
+use trepan_volume::{Grid, Interpolation, Segment, Segmentation, VoxelVolume, resample};
 
 /// Tissue class of a part of the brain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,28 +130,35 @@ impl TissueClass {
     }
 }
 
-/// Label volume of a class: `CLASS=PATH`, or `CLASS=PATH:CODE,CODE` if only some codes belong to
-/// it.
+/// Label volume of a class: `CLASS=PATH`, or `CLASS=PATH:LABEL,LABEL` if only some labels, codes or
+/// names of segments, belong to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TissueSource {
     /// The class.
     pub class: TissueClass,
     /// The label volume.
     pub path: PathBuf,
-    /// Codes of the class; empty = all nonzero codes.
+    /// Codes of the class; with no names either, all nonzero codes.
     pub codes: Vec<u16>,
+    /// Names of its segments.
+    pub names: Vec<String>,
 }
 
 impl TissueSource {
     /// The ventricles in a FreeSurfer segmentation (lateral, inferior lateral, third, fourth).
     pub fn ventricles_of_aseg(path: PathBuf) -> Self {
-        Self { class: TissueClass::Ventricle, path, codes: vec![4, 5, 14, 15, 43, 44] }
+        Self { class: TissueClass::Ventricle, path, codes: vec![4, 5, 14, 15, 43, 44], names: Vec::new() }
     }
 
     /// The regions of the brain in a FreeSurfer segmentation that were measured apart, then its
     /// ventricles.
     pub fn regions_of_aseg(path: PathBuf) -> Vec<Self> {
-        let of = |(class, codes): (TissueClass, &[u16])| Self { class, path: path.clone(), codes: codes.into() };
+        let of = |(class, codes): (TissueClass, &[u16])| Self {
+            class,
+            path: path.clone(),
+            codes: codes.into(),
+            names: Vec::new(),
+        };
         let regions: [(TissueClass, &[u16]); 4] = [
             (TissueClass::White, &[2, 41]),
             (TissueClass::Grey, &[3, 42]),
@@ -162,15 +169,55 @@ impl TissueSource {
         regions.into_iter().map(of).chain([ventricles]).collect()
     }
 
-    fn contains(&self, code: u16) -> bool {
-        if self.codes.is_empty() { code != 0 } else { self.codes.contains(&code) }
+    /// Reads the label volume; returns a mask of the class and remarks.
+    pub fn read(&self, notes: &mut Vec<String>) -> Result<VoxelVolume<u8>, SessionError> {
+        let read = Segmentation::read(&self.path)?;
+        let names = || read.segments.iter().map(|segment| segment.name.as_str()).collect::<Vec<_>>().join(", ");
+        let case = |fault: String| SessionError::Case(format!("--tissue {}: {fault}", self.class.name()));
+        let mut chosen = Vec::new();
+        for name in &self.names {
+            let of_name = |segment: &&Segment| segment.name.eq_ignore_ascii_case(name);
+            let segment = read.segments.iter().find(of_name).ok_or_else(|| {
+                let has = match read.segments.is_empty() {
+                    true => "names no segments: give codes".into(),
+                    false => format!("has {}", names()),
+                };
+                case(format!("{}: there is no segment {name:?}; the file {has}", self.path.display()))
+            })?;
+            chosen.push((segment.layer, segment.value));
+        }
+        let all = self.codes.is_empty() && self.names.is_empty();
+        if all && read.segments.len() > 1 {
+            notes.push(format!(
+                "{}: all {} segments are taken: {}; name some of them as PATH:NAME,NAME",
+                self.class.name(),
+                read.segments.len(),
+                names()
+            ));
+        }
+        let holds = |layer, code| code != 0 && (all || self.codes.contains(&code) || chosen.contains(&(layer, code)));
+        let mask = read.mask(holds);
+        if !mask.data.contains(&1) {
+            return Err(case(format!("{}: {} fill no voxel", self.path.display(), self.labels())));
+        }
+        Ok(mask)
     }
 
-    /// Writes the class's code to the brain voxels with its labels; returns a remark with the
-    /// volume.
-    pub fn paint(&self, ct_from_mri: DAffine3, classes: &mut VoxelVolume<u8>) -> Result<String, SessionError> {
-        let read = trepan_volume::labels(&self.path, &trepan_volume::read(&self.path)?)?;
-        let mut here = read.map(|code| u8::from(self.contains(code)));
+    /// Its labels, for messages.
+    fn labels(&self) -> String {
+        match self.codes.is_empty() && self.names.is_empty() {
+            true => "the nonzero codes".into(),
+            false => format!("labels {:?} {:?}", self.codes, self.names),
+        }
+    }
+
+    /// Writes the class's code to the brain voxels in its mask; returns a remark with the volume.
+    pub fn paint(
+        &self,
+        mut here: VoxelVolume<u8>,
+        ct_from_mri: DAffine3,
+        classes: &mut VoxelVolume<u8>,
+    ) -> Result<String, SessionError> {
         here.world_from_voxel = ct_from_mri * here.world_from_voxel;
         let all = here.data.iter().filter(|&&v| v != 0).count();
         let all_ml = all as f64 * here.spacing_mm().element_product() * 1e-3;
@@ -183,11 +230,10 @@ impl TissueSource {
         let ml = painted as f64 * classes.spacing_mm().element_product() * 1e-3;
         let name = self.class.name();
         if painted == 0 {
-            let codes =
-                if self.codes.is_empty() { "the nonzero codes".into() } else { format!("codes {:?}", self.codes) };
             return Err(SessionError::Case(format!(
-                "--tissue {name}: {}: {codes} fill {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and codes that are in them",
-                self.path.display()
+                "--tissue {name}: {}: {} fill {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and labels that are in them",
+                self.path.display(),
+                self.labels()
             )));
         }
         Ok(format!("{name}: {ml:.1} ml of the {all_ml:.1} ml that its labels fill lie in the brain"))
@@ -208,21 +254,27 @@ impl FromStr for TissueSource {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let known = || TissueClass::ALL[1..].iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
-        let remedy = || format!("expected CLASS=PATH or CLASS=PATH:CODE,CODE with CLASS one of {}", known());
+        let remedy = || format!("expected CLASS=PATH or CLASS=PATH:LABEL,LABEL with CLASS one of {}", known());
         let (name, place) = text.split_once('=').ok_or_else(remedy)?;
         let class = TissueClass::ALL[1..].iter().find(|class| class.name() == name).ok_or_else(remedy)?;
-        let codes = place.rsplit_once(':').and_then(|(path, codes)| {
-            let codes: Option<Vec<u16>> = codes.split(',').map(|code| code.trim().parse().ok()).collect();
-            Some((path, codes?))
-        });
-        let (path, codes) = codes.unwrap_or((place, Vec::new()));
-        if path.is_empty() { Err(remedy()) } else { Ok(Self { class: *class, path: path.into(), codes }) }
+        // A tail with a separator of folders belongs to the path, as after the letter of a drive.
+        let split = place.rsplit_once(':').filter(|(_, labels)| !labels.contains(['/', '\\']));
+        let (path, labels) = split.filter(|_| !Path::new(place).exists()).unwrap_or((place, ""));
+        let mut source = Self { class: *class, path: path.into(), codes: Vec::new(), names: Vec::new() };
+        for label in labels.split(',').map(str::trim).filter(|label| !label.is_empty()) {
+            match label.parse() {
+                Ok(code) => source.codes.push(code),
+                Err(_) => source.names.push(label.into()),
+            }
+        }
+        if path.is_empty() { Err(remedy()) } else { Ok(source) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
     use trepan_geometry::Vec3;
     use trepan_volume::nifti;
 
@@ -232,6 +284,8 @@ mod tests {
         assert_eq!((whole.class, whole.codes.len()), (TissueClass::Tumour, 0));
         let some: TissueSource = "ventricle=c:\\x\\aseg.mgz:4,43".parse().unwrap();
         assert_eq!((some.path, some.codes), (PathBuf::from("c:\\x\\aseg.mgz"), vec![4, 43]));
+        let named: TissueSource = "tumour=a/b.seg.nrrd:core, 3".parse().unwrap();
+        assert_eq!((named.codes, named.names), (vec![3], vec!["core".into()]));
         let odd: TissueSource = "grey=c:\\x".parse().unwrap();
         assert_eq!(odd.path, PathBuf::from("c:\\x"));
         for bad in ["tumor=x", "tumour", "brain=x", "tumour=", "tumour=:4"] {
@@ -249,13 +303,20 @@ mod tests {
         nifti::write(&path, &labels).unwrap();
         let mut classes = VoxelVolume::isotropic([10; 3], Vec3::ZERO, 1.0, 0u8);
         classes.data[200..].fill(1);
-        let source = |codes| TissueSource { class: TissueClass::Tumour, path: path.clone(), codes };
-        let remark = source(vec![7]).paint(DAffine3::IDENTITY, &mut classes).unwrap();
+        let source = |codes, names| TissueSource { class: TissueClass::Tumour, path: path.clone(), codes, names };
+        let seven = source(vec![7], Vec::new());
+        let mask = seven.read(&mut Vec::new()).unwrap();
+        let remark = seven.paint(mask.clone(), DAffine3::IDENTITY, &mut classes).unwrap();
         assert!(remark.contains("0.1 ml of the 0.3 ml"), "{remark}");
         let count = |code| classes.data.iter().filter(|&&v| v == code).count();
         assert_eq!((count(0), count(TissueClass::Tumour.code()), count(1)), (200, 100, 700));
-        let fault = source(vec![8]).paint(DAffine3::IDENTITY, &mut classes).unwrap_err().to_string();
-        assert!(fault.contains("labels.nii") && fault.contains("codes [8]"), "{fault}");
+        let aside = DAffine3::from_translation(DVec3::X * 50.0);
+        let outside = seven.paint(mask, aside, &mut classes).unwrap_err().to_string();
+        assert!(outside.contains("none of it in the brain"), "{outside}");
+        let fault = source(vec![8], Vec::new()).read(&mut Vec::new()).unwrap_err().to_string();
+        assert!(fault.contains("labels.nii") && fault.contains("labels [8]"), "{fault}");
+        let fault = source(Vec::new(), vec!["oedema".into()]).read(&mut Vec::new()).unwrap_err().to_string();
+        assert!(fault.contains("oedema") && fault.contains("give codes"), "{fault}");
     }
 
     #[test]

@@ -126,6 +126,7 @@ pub struct Odd {
     pub bits: [u16; 3],
     pub placed: bool,
     pub spaced: bool,
+    pub scaled: bool,
     pub rows: u16,
     pub pixels: usize,
 }
@@ -142,6 +143,7 @@ pub fn sound(k: usize) -> Odd {
         bits: [16, 16, 15],
         placed: true,
         spaced: true,
+        scaled: false,
         rows: N as u16,
         pixels: N * N,
     }
@@ -169,6 +171,9 @@ pub fn slice(k: usize, odd: &Odd) -> Vec<u8> {
         .short(0x0028_0101, odd.bits[1])
         .short(0x0028_0102, odd.bits[2])
         .short(0x0028_0103, 1);
+    if odd.scaled {
+        slice.text(0x0028_1052, b"DS", "0").text(0x0028_1053, b"DS", "1");
+    }
     let pixels = &ball().data[k * N * N..][..odd.pixels];
     let pixels: Vec<u8> = pixels.iter().flat_map(|hu| hu.to_le_bytes()).collect();
     match odd.syntax == PLAIN {

@@ -27,6 +27,7 @@ pub const TABLE: &[Wrong] = &[
     ("JPEG-LS that is none", "CT=jpeg-ls", &["PixelData", "SOI", "fetch the file again"]),
     ("JPEG 2000 that is none", "CT=jpeg-2000", &["PixelData", "JPEG 2000 stream is damaged"]),
     ("run lengths that are none", "CT=run-lengths", &["PixelData", "byte planes", "fetch the file again"]),
+    ("a slice without its rescale", "CT=unscaled", &["Rescale", "1 of 32 pictures", "export the series again"]),
     ("rows over all", "CT=tall", &["PixelData"]),
     ("an MRI series as CT", "CT=mr-series", &["modality is MR", "--ct", "--mri"]),
     ("a CT series as MRI", "MRI=series", &["modality is CT", "--ct", "--mri"]),
@@ -34,7 +35,7 @@ pub const TABLE: &[Wrong] = &[
     ("a series beyond the last", "CT=two-series --ct-series 2", &["no series 2", "numbered 0 to 1", "case series"]),
     ("a series beyond the only one", "CT=series --ct-series 7", &["no series 7", "number 0", "case series"]),
     ("a series of the MRI", "MRI=mr-series --mri-series 1", &["no series 1", "case series"]),
-    ("a series of a file", "CT=ct.nii --ct-series 0", &["it is a file", "give the folder"]),
+    ("a second volume of one", "CT=ct.nii --ct-series 1", &["ct.nii", "no volume 1", "leave the number out"]),
     ("a series of a slice", "--ct IN/series/1.2.3-05.dcm --mri IN/mri.nii --ct-series 0", &["it is a file", "folder"]),
     ("series of no folder", "case series IN/ct.nii", &["ct.nii", "give the one that holds the slices"]),
     ("series of a missing folder", "case series IN/no-such", &["no-such", "give"]),
@@ -93,6 +94,7 @@ pub fn make(home: &Path) {
     all("jpeg-ls", |odd| Odd { syntax: "1.2.840.10008.1.2.4.80", ..odd });
     all("jpeg-2000", |odd| Odd { syntax: "1.2.840.10008.1.2.4.90", ..odd });
     all("run-lengths", |odd| Odd { syntax: "1.2.840.10008.1.2.5", ..odd });
+    each("unscaled", &|k| Some(Odd { scaled: k != 9, ..sound(k) }));
     all("tall", |odd| Odd { rows: 65535, ..odd });
     all("mr-series", |odd| Odd { modality: "MR", ..odd });
     all("us-series", |odd| Odd { modality: "US", ..odd });

@@ -17,7 +17,7 @@ pub const TABLE: &[Wrong] = &[
     ("a JPEG", "CT=picture.jpg", &["picture.jpg", "a JPEG picture"]),
     ("a ZIP", "CT=images.zip", &["images.zip", "unpack it first"]),
     ("a PDF", "CT=report.pdf", &["report.pdf", "a PDF"]),
-    ("an MGH", "CT=t1.mgz", &["t1.mgz", "mri_convert"]),
+    ("an MGH cut off", "CT=t1.mgz", &["t1.mgz", "fetch the file again"]),
     ("noise", "CT=bytes.nii", &["bytes.nii", "no known format"]),
     ("an escape in a name", "--ct IN/\\e[2Jred.nii --mri IN/mri.nii", &["u{1b}[2Jred.nii", "give the path"]),
     // NIfTI
@@ -32,19 +32,18 @@ pub const TABLE: &[Wrong] = &[
     ("NIfTI one slice thick", "CT=thin.nii", &["thin.nii", "at least 2 voxels"]),
     ("NIfTI of no size", "CT=zero.nii", &["zero.nii", "at least 2 voxels"]),
     ("NIfTI of a negative size", "CT=negative.nii", &["negative.nii", "at least 2 voxels"]),
-    ("NIfTI over time", "CT=time.nii", &["time.nii", "5 volumes", "split the file"]),
+    ("NIfTI over time", "CT=time.nii", &["time.nii", "5 volumes", "--ct-series N"]),
+    ("NIfTI over time, beyond its end", "CT=time.nii --ct-series 5", &["time.nii", "5 volumes", "from 0"]),
     ("NIfTI of vectors", "CT=vectors.nii", &["vectors.nii", "3 volumes"]),
     ("NIfTI of colours", "CT=rgb.nii", &["rgb.nii", "colour", "grey values"]),
     ("NIfTI of complex numbers", "CT=complex.nii", &["complex.nii", "complex", "magnitude"]),
     ("NIfTI of a datatype that is none", "CT=datatype.nii", &["datatype.nii", "datatype", "is right"]),
     ("NIfTI of other bits", "CT=bitpix.nii", &["bitpix.nii", "bitpix"]),
-    ("NIfTI with voxels of no size", "CT=spacing.nii", &["spacing.nii", "pixdim", "mm are right"]),
     ("NIfTI with flat axes", "CT=axes.nii", &["axes.nii", "srow"]),
     ("NIfTI with axes that are no numbers", "CT=nan-axes.nii", &["nan-axes.nii", "srow"]),
     ("NIfTI on the moon", "CT=moon.nii", &["moon.nii", "srow"]),
     ("NIfTI with voxels before its head", "CT=offset.nii", &["offset.nii", "vox_offset", "352"]),
     ("NIfTI with voxels behind its end", "CT=beyond.nii", &["beyond.nii", "vox_offset"]),
-    ("NIfTI scaled by no number", "CT=slope.nii", &["slope.nii", "scl_slope"]),
     ("NIfTI that declares more", "CT=declares-more.nii", &["declares-more.nii", "limit is 600000000"]),
     ("packed NIfTI that unpacks to all memory", "CT=bomb.nii.gz", &["bomb.nii.gz", "dim", "limit is 600000000"]),
     ("the same as MRI", "MRI=bomb.nii.gz", &["bomb.nii.gz", "GB of memory", "crop"]),
@@ -77,7 +76,7 @@ pub const TABLE: &[Wrong] = &[
     ("MetaImage over time", "CT=time.mha", &["time.mha", "5 volumes"]),
     ("MetaImage of vectors", "CT=vectors.mha", &["vectors.mha", "3 volumes"]),
     ("MetaImage of an unknown type", "CT=type.mha", &["type.mha", "ElementType", "MET_SHORT"]),
-    ("MetaImage with voxels of no size", "CT=spacing.mha", &["spacing.mha", "ElementSpacing"]),
+    ("MetaImage with voxels of no size", "CT=spacing.mha", &["spacing.mha", "voxel edges", "mm are right"]),
     ("MetaImage with flat axes", "CT=axes.mha", &["axes.mha", "TransformMatrix"]),
     ("MetaImage of a mesh", "CT=mesh.mha", &["mesh.mha", "ObjectType", "only Image"]),
     ("MetaImage without its voxels", "CT=apart.mhd", &["no-such.raw", "no such file"]),
@@ -107,7 +106,16 @@ pub const TABLE: &[Wrong] = &[
         "CT=ct.nii --tissue tumour=IN/outside.nii",
         &["tumour", "outside.nii", "none of it in the brain"],
     ),
-    ("tissue of no code", "CT=ct.nii --tissue grey=IN/brain.nii:9", &["grey", "codes [9]", "codes that are in them"]),
+    ("tissue of no code", "CT=ct.nii --tissue grey=IN/brain.nii:9", &["grey", "labels [9]", "fill no voxel"]),
+    ("tissue of no segment", "CT=ct.nii --tissue grey=IN/brain.nii:core", &["grey", "\"core\"", "give codes"]),
+    ("a mask as MRI", "--ct IN/head-ct.nii --mri IN/head-brain.nii", &["mask or a label volume", "--labels", "--mri"]),
+    (
+        "a CT that is not in HU",
+        "--ct IN/offset-hu.nii --mri IN/mri.nii --labels IN/brain.nii",
+        &["no HU", "--isovalue-hu"],
+    ),
+    ("a segmentation of layers as MRI", "MRI=layers.seg.nrrd", &["layers.seg.nrrd", "segment", "--tissue"]),
+    ("a segmentation that is cut", "CT=ct.nii --tissue tumour=IN/cut.nrrd", &["cut.nrrd", "ends after"]),
     ("tissue that is an image", "CT=ct.nii --tissue grey=IN/ct.nii", &["ct.nii", "whole numbers"]),
     ("tissue that is missing", "CT=ct.nii --tissue grey=IN/no-such.nii", &["no-such.nii", "give the path"]),
     ("voxels metres apart", "CT=wide.nii", &["wide.nii", "28800 mm", "correct the voxel edges"]),
@@ -176,6 +184,10 @@ pub fn make(home: &Path) {
     ] {
         put(name, nrrd(from, to));
     }
+    let layers = "dimension: 4\nspace: RAS\nsizes: 2 32 32 16\nspace directions: none (2,0,0)";
+    let named = "type: uchar\nSegment0_Name:=tumour\nSegment0_Layer:=0\nSegment1_Name:=oedema\nSegment1_Layer:=1";
+    let of_layers = nrrd("dimension: 3\nspace: RAS\nsizes: 32 32 32\nspace directions: (2,0,0)", layers);
+    put("layers.seg.nrrd", replaced(&of_layers, "type: short", named));
     put("cut-head.nrrd", nrrd("type", "type")[..60].to_vec());
     put("cut.nrrd", nrrd("type", "type")[..5000].to_vec());
     for (name, from, to) in [
@@ -199,6 +211,12 @@ pub fn make(home: &Path) {
     report.extend([8, 0, 0x60, 0, b'C', b'S', 2, 0, b'S', b'R']);
     fs::create_dir(home.join("report")).unwrap();
     put("report.dcm", report);
+}
+
+/// Replaces a text in bytes once.
+fn replaced(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let at = bytes.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+    [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
 }
 
 fn niftis(put: &dyn Fn(&str, Vec<u8>)) {
@@ -227,13 +245,12 @@ fn niftis(put: &dyn Fn(&str, Vec<u8>)) {
         ("complex.nii", Nifti { datatype: 32, bitpix: 64, ..Nifti::default() }),
         ("datatype.nii", Nifti { datatype: 77, ..Nifti::default() }),
         ("bitpix.nii", Nifti { bitpix: 8, ..Nifti::default() }),
-        ("spacing.nii", Nifti { pixdim: [1.0, 0.0, 2.0, 2.0], ..Nifti::default() }),
         ("axes.nii", rows([[2.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, 0.0]])),
         ("nan-axes.nii", rows([[f32::NAN; 4]; 3])),
         ("moon.nii", rows([[2.0, 0.0, 0.0, 1e9], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 0.0]])),
         ("offset.nii", Nifti { vox_offset: 100.0, ..Nifti::default() }),
         ("beyond.nii", Nifti { vox_offset: 1e9, ..Nifti::default() }),
-        ("slope.nii", Nifti { slope: [f32::NAN, 0.0], ..Nifti::default() }),
+        ("offset-hu.nii", Nifti { slope: [1.0, 499.0], ..Nifti::default() }),
         ("declares-more.nii", dim([3, 2000, 2000, 2000, 1, 1, 1, 1])),
     ];
     of.iter().for_each(|(name, nifti)| put(name, nifti.with_ball()));

@@ -9,8 +9,8 @@ use std::path::Path;
 use trepan_mesh::lattice::{self, Fine};
 use trepan_volume::{
     AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, Islands, MaskError, ReadError,
-    RegistrationConfig, VoxelVolume, check_brain_mask, hounsfield, is_ct, largest_component, overlap, register,
-    resample, room_for, room_for_voxels, skull_only,
+    RegistrationConfig, Segmentation, VoxelVolume, check_brain_mask, flatness, hounsfield, is_ct, largest_component,
+    overlap, register, resample, room_for, room_for_voxels, skull_only,
 };
 
 /// Margin of the brain's grids around the brain, mm.
@@ -65,7 +65,74 @@ pub(super) fn read_mri(
             path.display()
         )));
     }
+    no_labels(path, &import.volume)?;
     Ok(import.volume)
+}
+
+/// A numerical parameter: flatness of an image from which it is a label volume.
+const FLAT: f64 = 0.6;
+
+/// Volume of the labels of a brain, ml; what is smaller or larger and flat may be a phantom.
+const LABELS_ML: std::ops::RangeInclusive<f64> = 300.0..=2000.0;
+
+/// Refuses a mask or a label volume given as an MRI.
+fn no_labels(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionError> {
+    let (flat, shown_ml) = flatness(image);
+    if flat < FLAT {
+        return Ok(());
+    }
+    let mut values: Vec<f32> = image.data.clone();
+    values.sort_unstable_by(f32::total_cmp);
+    values.dedup();
+    let is_head = shown_ml > *LABELS_ML.end() && values.len() > 2;
+    if is_head || shown_ml < *LABELS_ML.start() {
+        return Ok(());
+    }
+    Err(SessionError::Case(format!(
+        "{}: {:.0} % of its neighbouring voxels have one value, and it has {} values: it is a mask or a label volume, no MRI; give it with --labels or --tissue, and a T1 MRI with --mri",
+        path.display(),
+        100.0 * flat,
+        values.len()
+    )))
+}
+
+/// A numerical parameter: density of the commonest tissue in HU, with room for fat.
+const TISSUE_HU: std::ops::RangeInclusive<i16> = -200..=250;
+
+/// Doubts that a CT is in HU, by its commonest tissue.
+///
+/// It is an error if a brain is to be found in it and much of what is not air passes for bone.
+pub(super) fn scale_doubt(
+    ct: &VoxelVolume<i16>,
+    isovalue_hu: i16,
+    with_mri: bool,
+) -> Result<Option<String>, SessionError> {
+    const AIR: i16 = -500;
+    const BIN: usize = 50;
+    let mut counts = [0usize; 2000 / BIN];
+    let (mut dense, mut shown) = (0usize, 0usize);
+    for &hu in ct.data.iter().filter(|&&hu| hu > AIR) {
+        shown += 1;
+        dense += usize::from(hu >= isovalue_hu);
+        if let Some(count) = counts.get_mut(i32::from(hu).abs_diff(AIR.into()) as usize / BIN) {
+            *count += 1;
+        }
+    }
+    let commonest = counts.iter().enumerate().max_by_key(|(_, count)| **count).map_or(0, |(bin, _)| bin);
+    let tissue_hu = AIR + (BIN * commonest + BIN / 2) as i16;
+    let dense = dense as f64 / shown.max(1) as f64;
+    if TISSUE_HU.contains(&tissue_hu) {
+        return Ok(None);
+    }
+    let found = format!(
+        "the CT's values are no HU: its commonest tissue lies at {tissue_hu} (in HU near 40), and {:.0} % of what is not air is over {isovalue_hu}, as in a cone-beam CT; give the threshold of bone with --isovalue-hu, such as {}",
+        100.0 * dense,
+        tissue_hu + 400
+    );
+    match with_mri && dense > 1.0 / 3.0 {
+        true => Err(SessionError::Case(found)),
+        false => Ok(Some(found)),
+    }
 }
 
 /// Largest accepted extent of an image, mm.
@@ -130,9 +197,14 @@ fn brain_note(confidence: &BrainConfidence) -> String {
     format!("brain found in the MRI: {confidence}{doubt}")
 }
 
-/// Brain mask: the nonzero labels, else a segmentation of the MRI.
+/// Reads a label volume as a mask of its nonzero voxels.
+pub(super) fn read_labels(path: &Path) -> Result<VoxelVolume<u8>, SessionError> {
+    Ok(Segmentation::read(path)?.mask(|_, code| code != 0))
+}
+
+/// Brain mask: the labels given, with their file, else a segmentation of the MRI.
 pub(super) fn find_brain(
-    inputs: &Inputs,
+    given: Option<(&Path, VoxelVolume<u8>)>,
     mri: &VoxelVolume<f32>,
     ct_from_mri: DAffine3,
     ct: Option<&VoxelVolume<i16>>,
@@ -140,16 +212,17 @@ pub(super) fn find_brain(
     notes: &mut Vec<String>,
 ) -> Result<VoxelVolume<u8>, SessionError> {
     let config = BrainConfig { isovalue: Some(isovalue_hu), ..BrainConfig::default() };
-    let Some(path) = &inputs.labels else {
+    let Some((path, mut whole)) = given else {
         let found = trepan_volume::find_brain(mri, ct, &config);
         let found = found.map_err(|fault| SessionError::Case(format!("{fault} (--labels PATH)")))?;
         notes.push(brain_note(&found.confidence));
+        if found.is_stripped {
+            notes.push("the MRI shows the brain alone (skull-stripped): what it shows is the brain".into());
+        }
         return Ok(found.mask);
     };
     let case = |fault: String| SessionError::Case(format!("{}: {fault}", path.display()));
-    let mut labels = trepan_volume::labels(path, &trepan_volume::read(path)?)?;
-    labels.world_from_voxel = ct_from_mri * labels.world_from_voxel;
-    let whole = labels.map(|label| u8::from(label != 0));
+    whole.world_from_voxel = ct_from_mri * whole.world_from_voxel;
     let mask = largest_component(&whole);
     match check_brain_mask(&mask, &config) {
         Err(fault @ MaskError::Volume { .. }) => notes.push(format!("labels: {fault}")),
@@ -186,14 +259,14 @@ pub(super) fn make_skull(
 
 /// Builds the tissue classes on a grid around the brain.
 pub(super) fn make_classes(
-    inputs: &Inputs,
+    (inputs, tissues): (&Inputs, Vec<VoxelVolume<u8>>),
     mask: &VoxelVolume<u8>,
     ct_from_mri: DAffine3,
     notes: &mut Vec<String>,
 ) -> Result<VoxelVolume<u8>, SessionError> {
     let mut classes = cropped(mask)?;
-    for source in &inputs.tissues {
-        notes.push(source.paint(ct_from_mri, &mut classes)?);
+    for (source, here) in inputs.tissues.iter().zip(tissues) {
+        notes.push(source.paint(here, ct_from_mri, &mut classes)?);
     }
     Ok(classes)
 }

@@ -8,7 +8,9 @@
 //! file names may contain a patient's name. Properties of the images ([`Facts`]) are cached too, so
 //! that the numbers can be chosen without reading the images again.
 
-use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_skull, read_ct, read_mri, registered};
+use crate::case::anatomy::{
+    cropped, find_brain, make_brain, make_classes, make_skull, read_ct, read_labels, read_mri, registered, scale_doubt,
+};
 use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
@@ -34,7 +36,7 @@ use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_volume::{VoxelVolume, bone_isovalue, overlap, skull_only};
+use trepan_volume::{VoxelVolume, bone_isovalue, leans, overlap, skull_only};
 
 /// Opens a case: from the cache if it was built before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
@@ -224,7 +226,7 @@ fn key_of_images(program: Program, inputs: &Inputs, requested: &Recipe, cache: &
     let tissues = inputs.tissues.iter().map(|source| &source.path);
     let files: Vec<&Path> = images.into_iter().flatten().chain(tissues).map(PathBuf::as_path).collect();
     let given = images.map(Option::is_some);
-    let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes)).collect();
+    let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes, &source.names)).collect();
     let of_images = Recipe { spacing_mm: 0.0, tets: 0, halvings: 0, ..*requested };
     cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}"))
 }
@@ -261,6 +263,8 @@ struct Images {
     ct: Option<VoxelVolume<i16>>,
     mri: Option<VoxelVolume<f32>>,
     mask: Option<VoxelVolume<u8>>,
+    /// Mask of each tissue source, in its order.
+    tissues: Vec<VoxelVolume<u8>>,
     ct_from_mri: DAffine3,
     isovalue_hu: i16,
     fit_png: Option<Vec<u8>>,
@@ -270,8 +274,14 @@ struct Images {
 fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<Images, SessionError> {
     let mut notes = Vec::new();
     stages.next("reading the CT")?;
+    // Labels first: they take a second, and what is wrong with them is said before the rest begins.
+    let labels = inputs.labels.as_deref().map(read_labels).transpose()?;
+    let tissues = inputs.tissues.iter().map(|source| source.read(&mut notes)).collect::<Result<_, _>>()?;
     let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut notes)).transpose()?;
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
+    if let Some(ct) = ct.as_ref().filter(|_| recipe.isovalue_hu.is_none()) {
+        notes.extend(scale_doubt(ct, isovalue_hu, inputs.mri.is_some())?);
+    }
     stages.offer_skull(ct.as_ref().map(|ct| || case_folder::in_draft(ct, isovalue_hu)));
     stages.next("reading the MRI")?;
     let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, recipe.mri_series, &mut notes)).transpose()?;
@@ -287,17 +297,27 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     }
     stages.next("segmenting the brain")?;
     let space = ct.as_ref().map(|ct| Space { ct, isovalue_hu, registered: recipe.register });
+    let mut is_checked = true;
     if let Some((space, mri)) = space.as_ref().zip(mri.as_ref()) {
-        notes.extend(space.check_mri(mri)?);
+        is_checked = space.check_mri(mri, &mut notes)?;
     }
+    let given = inputs.labels.as_deref().zip(labels);
+    let found_in = if given.is_some() { "the labels" } else { "the brain found in the skull" };
+    is_checked &= given.is_none();
     let mask = mri
         .as_ref()
-        .map(|mri| find_brain(inputs, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut notes))
+        .map(|mri| find_brain(given, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut notes))
         .transpose()?;
-    if let Some((space, mask)) = space.zip(mask.as_ref().filter(|_| inputs.labels.is_some())) {
-        notes.extend(space.check("the labels", mask)?);
+    if let (Some(space), Some(mri), Some(mask)) = (space, &mri, &mask) {
+        if !is_checked {
+            space.check(found_in, mask, mri, &mut notes)?;
+        }
+        notes.extend(space.stray(mask)?);
     }
-    Ok(Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
+    if mask.as_ref().is_some_and(leans) {
+        notes.push("the head may not lie as its image says: its brain is not longest from back to front, or not alike left and right; check the planes in the slices".into());
+    }
+    Ok(Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
 }
 
 fn build(
@@ -307,13 +327,13 @@ fn build(
     recipe: &Recipe,
     stages: &mut ImportStages,
 ) -> Result<Case, SessionError> {
-    let Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
+    let Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull")?;
     let made = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
     notes.extend(made.as_ref().and_then(|(_, islands)| islands.note()));
     let skull = made.map(|(skull, _)| skull);
     stages.next("planning the opening")?;
-    let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
+    let classes = mask.map(|mask| make_classes((inputs, tissues), &mask, ct_from_mri, &mut notes)).transpose()?;
     let on_skull = |(ct, skull)| match known {
         Some(opening) => opening.on(&bone_of(skull, isovalue_hu)?, classes.is_some()),
         None => Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe),

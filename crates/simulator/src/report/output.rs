@@ -15,11 +15,19 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
-use trepan_volume::{BoneVolume, VoxelVolume, nifti};
+use trepan_volume::{BoneVolume, VoxelVolume, write_beside};
 
 /// Files that a session writes into its folder, besides pictures.
-const NAMES: [&str; 7] =
-    ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled-fine.nii.gz", "drilled.stl", RECORDING];
+const NAMES: [&str; 8] = [
+    "summary.json",
+    "scores.csv",
+    "report.html",
+    "drilled.nii.gz",
+    "drilled.nrrd",
+    "drilled-fine.nii.gz",
+    "drilled.stl",
+    RECORDING,
+];
 /// Default name of the recording; `--record` gives another.
 pub(crate) const RECORDING: &str = "session.mcap";
 /// Largest number of letters of a session's name in the name of its folder.
@@ -133,8 +141,8 @@ pub(crate) fn skull(
     surface: bool,
 ) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
-    for (name, volume) in [("drilled.nii.gz", Some(densities)), ("drilled-fine.nii.gz", around)] {
-        volume.map_or(Ok(()), |volume| nifti::write(&out.join(name), volume)).map_err(|fault| failed(&fault))?;
+    for (name, volume) in [("drilled", Some(densities)), ("drilled-fine", around)] {
+        volume.map_or(Ok(()), |volume| write_beside(out, name, volume).map(drop)).map_err(|fault| failed(&fault))?;
     }
     if surface {
         let triangles = isosurface(&drilled::on_nodes(bone), bone.isovalue());
