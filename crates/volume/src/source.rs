@@ -340,6 +340,10 @@ impl Part {
             None if of == 1 => 0,
             None => return Err(wrong("one must be chosen: give --ct-series N or --mri-series N, from 0")),
             Some(n) if (n as u64) < of => n as u64,
+            Some(n) if of == 1 => {
+                let found = format!("there is no volume {n}: it holds one, number 0");
+                return Err(ReadError::Series { folder: file.into(), found, remedy: "leave the number out" });
+            }
             Some(_) => return Err(wrong("numbers go from 0 to one less")),
         };
         let note = Note::OneOf { what: "volumes", count: of as usize, chosen: chosen as usize };
