@@ -22,6 +22,9 @@ use super::{FULL_SCALE, Knob, Link, hid};
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::Duration;
 use trepan_geometry::Vec3;
 
 /// Count that a knob of absolute axes reports at full deflection.
@@ -41,16 +44,33 @@ pub(super) struct Daemon {
     socket: UnixStream,
     buffer: [u8; MESSAGE],
     filled: usize,
-    /// Device file of the knob, if one is plugged in.
-    file: Option<PathBuf>,
+    /// Whether the knob's device file is gone; set by a thread that looks for it.
+    gone: Arc<AtomicBool>,
     /// Whether its axes are absolute, if the system says.
     absolute: Option<bool>,
-    /// Reads without a message.
-    idle: u32,
 }
 
-/// Reads without a message after which the knob's device file is looked for.
-const IDLE: u32 = 100;
+/// Time between two looks for a knob's device file.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Looks for a device file from a thread of its own, since a tick does not.
+///
+/// The flag is set when the file is gone. The thread ends then, or with the flag's owner.
+fn watched(file: PathBuf) -> Arc<AtomicBool> {
+    let gone = Arc::new(AtomicBool::new(false));
+    let flag = Arc::downgrade(&gone);
+    std::thread::spawn(move || {
+        while let Some(flag) = flag.upgrade() {
+            flag.store(!file.exists(), Relaxed);
+            if flag.load(Relaxed) {
+                break;
+            }
+            drop(flag);
+            std::thread::park_timeout(LOOK);
+        }
+    });
+    gone
+}
 
 /// Path of the daemon's socket.
 pub(super) fn usual_place() -> PathBuf {
@@ -65,7 +85,7 @@ impl Daemon {
         socket.write_all(&VERSION_1.to_ne_bytes())?;
         let file = hid::find();
         let absolute = file.as_deref().and_then(hid::is_absolute);
-        Ok(Self { socket, buffer: [0; MESSAGE], filled: 0, file, absolute, idle: 0 })
+        Ok(Self { socket, buffer: [0; MESSAGE], filled: 0, gone: file.map(watched).unwrap_or_default(), absolute })
     }
 }
 
@@ -88,8 +108,7 @@ impl Link for Daemon {
                 Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
                 Ok(count) => self.filled += count,
                 Err(fault) if fault.kind() == ErrorKind::WouldBlock => {
-                    self.idle += 1;
-                    if self.idle.is_multiple_of(IDLE) && self.file.as_ref().is_some_and(|file| !file.exists()) {
+                    if self.gone.load(Relaxed) {
                         *knob = Knob::default();
                     }
                     return Ok(false);
@@ -98,7 +117,7 @@ impl Link for Daemon {
                 Err(fault) => return Err(fault),
             }
         }
-        (self.filled, self.idle) = (0, 0);
+        self.filled = 0;
         apply(&numbers(&self.buffer), knob);
         Ok(true)
     }
@@ -123,6 +142,20 @@ fn apply(message: &[i32; 8], knob: &mut Knob) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_device_file_that_goes_is_noticed() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let gone = watched(file.path().into());
+        std::thread::sleep(2 * LOOK);
+        assert!(!gone.load(Relaxed));
+        drop(file);
+        let noticed = (0..50).any(|_| {
+            std::thread::sleep(LOOK);
+            gone.load(Relaxed)
+        });
+        assert!(noticed);
+    }
 
     #[test]
     fn any_message_is_handled() {
