@@ -46,8 +46,8 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// The tool, if one is shown.
     pub tool: Option<Tool>,
-    /// The tool's pose. Slices pass through its tip, or through the camera's target if the tip is
-    /// outside the scanned box.
+    /// The tool's pose. Slices pass through its tip unless [`SliceLook::through`] says otherwise, or
+    /// through the camera's target if the tip is outside the scanned box.
     pub world_from_tool: Pose,
     /// The tool in the other hand, and its pose.
     pub second: Option<(Tool, Pose)>,
@@ -88,12 +88,14 @@ pub struct SliceLook {
     pub mri_share: f32,
     /// Half the height of the visible area, mm; `None` shows the whole volume.
     pub half_height_mm: Option<f32>,
+    /// Point through which the slices pass, world mm; `None` follows the tool.
+    pub through: Option<Vec3>,
 }
 
 impl Default for SliceLook {
     /// A bone window, with the MRI inside the skull.
     fn default() -> Self {
-        Self { shown: true, level_hu: 500.0, width_hu: 2000.0, mri_share: 0.85, half_height_mm: None }
+        Self { shown: true, level_hu: 500.0, width_hu: 2000.0, mri_share: 0.85, half_height_mm: None, through: None }
     }
 }
 
@@ -105,10 +107,13 @@ impl SliceLook {
 }
 
 impl Frame<'_> {
-    /// Intersection of the slices: the tool's tip, or the camera's target if the tip is outside the
-    /// volumes' box.
+    /// Intersection of the slices: the chosen point, else the tool's tip, or the camera's target if
+    /// the tip is outside the volumes' box.
     pub(crate) fn focus(&self, bounds: Aabb) -> Vec3 {
         let tip = self.world_from_tool.translation;
+        if let Some(chosen) = self.slices.through {
+            return chosen.clamp(bounds.min, bounds.max);
+        }
         if bounds.contains(tip) { tip } else { self.camera.target.clamp(bounds.min, bounds.max) }
     }
 

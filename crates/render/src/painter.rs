@@ -13,6 +13,7 @@ use crate::image::Image;
 use crate::kept::Kept;
 use crate::report::DrawReport;
 use crate::{Casting, ProcessorRenderer, RenderError, Renderer, View};
+use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
 
 /// Draws finished pictures of one scene on any machine.
@@ -143,6 +144,11 @@ impl Painter {
             By::Device(renderer) => renderer.view(frame),
             By::Processor(processor) => processor.view(frame),
         }
+    }
+
+    /// The box that the slices show, world mm.
+    pub fn bounds(&self) -> Aabb {
+        self.kept.bounds
     }
 
     /// The renderer on the device, if in use.

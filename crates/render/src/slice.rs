@@ -26,6 +26,8 @@ const AXES: [[Vec3; 2]; 3] = [[Vec3::NEG_X, Vec3::Y], [Vec3::NEG_X, Vec3::Z], [V
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Plane {
     pub centre: Vec3,
+    /// The point common to all three planes.
+    pub through: Vec3,
     pub right: Vec3,
     pub up: Vec3,
     /// Half width and half height of the visible area, mm.
@@ -45,7 +47,7 @@ impl Plane {
             let around = if half_height_mm.is_some() { through } else { bounds.centre() };
             let centre = around + normal * normal.dot(through - around);
             let height = half_height_mm.unwrap_or(whole).max(1.0);
-            Self { centre, right, up, half: Vec2::new(height * aspect, height) }
+            Self { centre, through, right, up, half: Vec2::new(height * aspect, height) }
         })
     }
 
@@ -59,6 +61,12 @@ impl Plane {
     pub fn at(&self, point: Vec3) -> Vec2 {
         let from = point - self.centre;
         Vec2::new(from.dot(self.right), from.dot(self.up)) / self.half
+    }
+
+    /// World point at picture coordinates from -1 to 1.
+    pub fn point(&self, at: Vec2) -> Vec3 {
+        let along = at * self.half;
+        self.centre + along.x * self.right + along.y * self.up
     }
 
     /// Intersection of the plane with a triangle, in picture coordinates from -1 to 1.

@@ -245,6 +245,11 @@ impl Renderer {
         frame.camera.view(width as f32 / height as f32)
     }
 
+    /// The box that the slices show, world mm.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
     /// The last picture on the device.
     pub fn texture(&self) -> &Texture {
         &self.canvas.picture

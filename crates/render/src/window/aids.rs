@@ -11,6 +11,8 @@ use glam::Vec3;
 const TOUCH_MM: f32 = 0.5;
 /// Largest distance to a surface below the tool, mm.
 const FAR_MM: f32 = 200.0;
+/// Distance of bars and numbers from the tool, points.
+const BESIDE: f32 = 22.0;
 /// Corners of the drop shadow.
 const CORNERS: usize = 24;
 /// Shares of the largest force from which the pressure is shown as high, and as too high.
@@ -37,14 +39,16 @@ pub(crate) fn show(ui: &egui::Ui, area: Rect, around: &Around<'_>, panel: &Panel
                 on_screen(point + radius_mm * (cos * right + sin * up) + 0.1 * hit.normal)
             };
             let shadow: Vec<Pos2> = (0..CORNERS).filter_map(corner).collect();
-            let dark = Color32::from_black_alpha(110);
-            painter.add(Shape::convex_polygon(shadow, dark, Stroke::new(1.5, SKY)));
+            // A ring, not a disc: what lies under it counts.
+            let beside = shadow.iter().map(|at| at.x).fold(to.x, f32::max) + BESIDE;
+            painter.add(Shape::closed_line(shadow, Stroke::new(1.5, SKY)));
             painter.line_segment([from, to], Stroke::new(1.5, SKY));
-            label(&painter, to + egui::vec2(10.0, 4.0), &format!("{gap:.1} mm"), SKY);
+            label(&painter, egui::pos2(beside, to.y + 4.0), &format!("{gap:.1} mm"), SKY);
         }
     }
     if let Some(at) = on_screen(tip).filter(|_| pressed && panel.force_n > 0.0) {
-        pressure(&painter, at, panel);
+        let edge = on_screen(tip + radius_mm * around.view.right).map_or(0.0, |edge| edge.x - at.x);
+        pressure(&painter, at + egui::vec2(edge.max(0.0) + BESIDE, 0.0), panel);
     }
 }
 
@@ -58,7 +62,7 @@ fn pressure(painter: &egui::Painter, at: Pos2, panel: &Panel) {
     } else {
         GREEN
     };
-    let frame = Rect::from_min_size(at + egui::vec2(28.0, -36.0), egui::vec2(10.0, 72.0));
+    let frame = Rect::from_min_size(at + egui::vec2(0.0, -36.0), egui::vec2(10.0, 72.0));
     painter.rect_filled(frame, 2.0, Color32::from_black_alpha(170));
     let filled = Rect::from_min_max(egui::pos2(frame.left(), frame.bottom() - share * frame.height()), frame.max);
     painter.rect_filled(filled, 2.0, colour);

@@ -7,8 +7,8 @@ use eframe::egui::{self, Key};
 
 /// Time for which an answer stands, s.
 const STANDS_S: f64 = 4.0;
-/// Keys that move tool or view by themselves, or belong to the focused widget.
-const QUIET: [Key; 13] = [
+/// Keys that move tool or view by themselves, belong to the focused widget, or only modify others.
+const QUIET: [Key; 22] = [
     Key::ArrowUp,
     Key::ArrowDown,
     Key::ArrowLeft,
@@ -22,6 +22,15 @@ const QUIET: [Key; 13] = [
     Key::Enter,
     Key::Home,
     Key::End,
+    Key::ShiftLeft,
+    Key::ShiftRight,
+    Key::ControlLeft,
+    Key::ControlRight,
+    Key::AltLeft,
+    Key::AltRight,
+    Key::SuperLeft,
+    Key::SuperRight,
+    Key::CapsLock,
 ];
 
 /// Slots of a choice that have number keys, in their order.
@@ -74,6 +83,7 @@ pub(crate) fn done(command: Command, name: &str, look: &Look, large: bool) -> St
         Command::Section => on(look.section.is_some()),
         Command::Stereo => on(look.stereo.is_some()),
         Command::LargeType => on(large),
+        Command::Quit => "the session goes on until you say so".into(),
         _ => name.to_string(),
     }
 }

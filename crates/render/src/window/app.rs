@@ -7,22 +7,26 @@ use super::input::ViewAndTool;
 use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
-use super::pointer::Pointer;
+use super::pointer::{Pointer, view_area};
 use super::quality::{Quality, Step};
 use super::screen::{Area, Screen};
 use super::surface::{Ray, Surfaces};
-use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, timeline};
-use crate::View;
+use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, slices, timeline};
+use crate::slice::Plane;
+use crate::{Frame, View};
 use eframe::egui;
 use eframe::egui_wgpu::RenderState;
 use glam::Vec3;
 use std::time::{Duration, Instant};
+use trepan_geometry::Aabb;
 
 /// First and least width of the side panel, points; at most half of the window.
 const PANEL_WIDTH: f32 = 270.0;
 const PANEL_LEAST: f32 = 180.0;
 /// Longest time between pictures that the tool is led by, s. A slow picture must not slow the feed.
 const LONGEST_S: f32 = 0.4;
+/// Largest height of the slices' own window, points.
+const SLICES_HIGH: f32 = 900.0;
 /// Scale of large type.
 const LARGE: f32 = 1.4;
 
@@ -52,19 +56,22 @@ pub(super) struct Window<S, D> {
     pub(super) drawn_at: f64,
     /// Time from the picture before to that, s.
     dt_s: f32,
+    /// Whether the user is asked if the session shall end.
+    asks: bool,
     over: bool,
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
     pub fn new(lent: Lent<S, D>, start: Start, copies: bool) -> Self {
         let hardware = lent.borrow().as_ref().and_then(|s| s.renderer.device()).is_some_and(|gpu| !gpu.is_software());
+        let head = lent.borrow().as_ref().map(|shared| shared.renderer.bounds());
         Self {
             lent,
             hand: ViewAndTool { world_from_tool: start.world_from_tool, camera: start.camera, guide: Guide::default() },
             traces: Traces::default(),
             panel: Panel::default(),
             clicks: Clicks::default(),
-            look: Look::with(start.microscope),
+            look: Look::with(start.microscope, head),
             start,
             captures: Captures::default(),
             answers: Answers::default(),
@@ -79,6 +86,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             last: None,
             drawn_at: 0.0,
             dt_s: 0.0,
+            asks: false,
             over: false,
         }
     }
@@ -112,6 +120,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         if self.help {
             keys::help(ui.ctx(), &self.panel.actions);
         }
+        self.ask(ui);
         self.over |= shared.fault.is_some();
         let rate_hz = self.start.rate_hz.min(self.quality.most_hz());
         let period = Duration::from_secs_f32(1.0 / rate_hz.clamp(1.0, 240.0));
@@ -143,14 +152,39 @@ impl<S: Session, D: Draws> Window<S, D> {
                 Command::FullScreen => self.fill(ui),
                 #[cfg(feature = "sound")]
                 Command::Mute => self.audio.muted ^= true,
-                Command::Quit if std::mem::take(&mut self.help) => (),
-                Command::Quit => self.over = true,
+                Command::Close if std::mem::take(&mut self.help) || std::mem::take(&mut self.asks) => (),
+                Command::Close if self.panel.by_hand => {
+                    self.hand.guide.withdraws = true;
+                    self.answers.give(keys::name(Command::Withdraw).into(), now);
+                    continue;
+                }
+                Command::Close => (),
+                // Closing a replay loses nothing.
+                Command::Quit if self.panel.timeline.is_some() => self.over = true,
+                Command::Quit => self.asks = true,
                 of_view => self.look.react(of_view, &mut self.hand.camera),
             }
             self.answers.give(answers::done(command, keys::name(command), &self.look, self.large), now);
         }
         commands.retain(|command| answers::refusal(*command, &self.panel, &self.look).is_none());
         self.clicks.commands = commands;
+    }
+
+    /// Asks once whether the session shall end, also where the window is to be closed.
+    fn ask(&mut self, ui: &egui::Ui) {
+        let closes = ui.input(|input| input.viewport().close_requested());
+        if closes && !self.asks && self.panel.timeline.is_none() && !self.over {
+            ui.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            self.asks = true;
+        }
+        if !self.asks {
+            return;
+        }
+        match keys::end(ui.ctx()) {
+            Some(true) => self.over = true,
+            Some(false) => self.asks = false,
+            None => (),
+        }
     }
 
     fn enlarge(&mut self, ui: &egui::Ui) {
@@ -236,7 +270,18 @@ impl<S: Session, D: Draws> Window<S, D> {
             Ok(view) => {
                 self.last = Some(view);
                 self.screen.paint(ui, area, 0);
-                parts.slices_aspect().into_iter().for_each(|aspect| self.slices(ui, aspect));
+                let chosen = match parts.slices_aspect() {
+                    Some(aspect) => self.slices(ui, aspect, (&frame, shared.renderer.bounds())),
+                    None => {
+                        let left = view_area(area, &view).right();
+                        let column = egui::Rect::from_min_max(egui::pos2(left, area.top()), area.max);
+                        let ours = response.hovered() || response.is_pointer_button_down_on();
+                        self.on_slices(ui, column, (&frame, shared.renderer.bounds()), ours)
+                    }
+                };
+                if let Some(point) = chosen {
+                    self.look.slices.through = Some(point);
+                }
                 self.lead(ui, &response, &view, &shared.session);
                 let corner = area.left_bottom() + egui::vec2(6.0, -4.0);
                 let (font, grey) = (egui::TextStyle::Small.resolve(ui.style()), egui::Color32::from_gray(170));
@@ -252,20 +297,44 @@ impl<S: Session, D: Draws> Window<S, D> {
         }
     }
 
-    /// Shows the slices in a window of their own, for another screen.
-    fn slices(&mut self, ui: &egui::Ui, aspect: f32) {
+    /// Shows the slices in a window of their own, for another screen; returns the point that the
+    /// mouse chooses there.
+    fn slices(&mut self, ui: &egui::Ui, aspect: f32, scene: (&Frame, Aabb)) -> Option<Vec3> {
         let id = egui::ViewportId::from_hash_of("slices");
+        let screen_height = ui.input(|input| input.viewport().monitor_size).map_or(SLICES_HIGH, |size| 0.85 * size.y);
+        let height = screen_height.min(SLICES_HIGH);
         let window = egui::ViewportBuilder::default()
             .with_title(super::words::tr("Slices"))
-            .with_inner_size([900.0 * aspect, 900.0]);
-        let (screen, apart) = (&self.screen, &mut self.look.apart);
+            .with_inner_size([height * aspect, height]);
         ui.ctx().show_viewport_immediate(id, window, |ui, _| {
             let space = ui.max_rect();
             let size =
                 egui::vec2(space.width().min(space.height() * aspect), space.height().min(space.width() / aspect));
-            screen.paint(ui, egui::Rect::from_center_size(space.center(), size), 1);
-            *apart &= !ui.input(|input| input.viewport().close_requested());
-        });
+            let column = egui::Rect::from_center_size(space.center(), size);
+            self.screen.paint(ui, column, 1);
+            self.look.apart &= !ui.input(|input| input.viewport().close_requested());
+            self.on_slices(ui, column, scene, true)
+        })
+    }
+
+    /// Draws the marks of the slices in a column, and returns the point that the mouse chooses there
+    /// if the input is `ours`.
+    fn on_slices(
+        &self,
+        ui: &egui::Ui,
+        column: egui::Rect,
+        (frame, bounds): (&Frame, Aabb),
+        ours: bool,
+    ) -> Option<Vec3> {
+        if !frame.slices.shown || column.width() < 1.0 {
+            return None;
+        }
+        let [width, height] = [column.width(), column.height() / 3.0].map(|points| points.round().max(1.0) as u32);
+        let rectangles = [[0, 0, width, height]; 3];
+        let planes = Plane::three(frame.focus(bounds), bounds, frame.slices.half_height_mm, &rectangles);
+        let brain = frame.brain_positions.is_some_and(|positions| !positions.is_empty());
+        slices::marks(ui, column, &planes, self.look.slices.through.is_some(), brain);
+        ours.then(|| slices::chosen(ui, column, &planes)).flatten()
     }
 
     /// Moves view and tool by pointer and keys, and draws where the tool will land.
@@ -288,7 +357,6 @@ impl<S: Session, D: Draws> Window<S, D> {
             pedal: ui.input(|i| i.key_down(egui::Key::Space)) || self.clicks.pedal,
         };
         self.tip = frame.world_from_tool.translation;
-        self.look.follow(&mut self.hand.camera, self.tip);
         let ViewAndTool { world_from_tool, guide, .. } = &mut self.hand;
         guide.follow(world_from_tool, &pointer, &around);
         guide.through().into_iter().for_each(|text| self.answers.give(text.into(), self.drawn_at));

@@ -1,6 +1,7 @@
 //! The renderers that a window can use.
 
 use crate::{Frame, Image, Painter, RenderError, Renderer, View};
+use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, Texture};
 
 /// What a further sample of the edges gave.
@@ -38,6 +39,9 @@ pub trait Draws {
         Ok(Refined::Complete)
     }
 
+    /// The box that the slices show, world mm.
+    fn bounds(&self) -> Aabb;
+
     /// Whether bone has changed since the last picture.
     fn is_stale(&mut self) -> bool {
         false
@@ -70,6 +74,10 @@ impl Draws for Renderer {
             true if copied => Refined::Copied(self.image()?),
             true => Refined::Drawn,
         })
+    }
+
+    fn bounds(&self) -> Aabb {
+        Renderer::bounds(self)
     }
 
     fn is_stale(&mut self) -> bool {
@@ -105,6 +113,10 @@ impl Draws for Painter {
             true if copied => Refined::Copied(self.image()?),
             true => Refined::Drawn,
         })
+    }
+
+    fn bounds(&self) -> Aabb {
+        Painter::bounds(self)
     }
 
     fn is_stale(&mut self) -> bool {

@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wheel_with_control_zooms_through_egui_and_pushes_nothing() {
+    fn the_wheel_zooms_and_pushes_the_tool_only_with_shift() {
         let turned = |modifiers: egui::Modifiers| {
             let context = egui::Context::default();
             let (mut zoom, mut wheel) = (1.0, 0.0);
@@ -205,7 +205,9 @@ mod tests {
                 let (delta, phase) = (egui::vec2(0.0, 1.0), egui::TouchPhase::Move);
                 let source = egui::MouseWheelSource::Unknown;
                 let turn = turn.then_some(egui::Event::MouseWheel { unit, delta, phase, source, modifiers });
-                let events = [egui::Event::PointerMoved(egui::pos2(100.0, 100.0))].into_iter().chain(turn).collect();
+                let held = egui::Event::ModifiersChanged(modifiers);
+                let moved = egui::Event::PointerMoved(egui::pos2(100.0, 100.0));
+                let events = [held, moved].into_iter().chain(turn).collect();
                 let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(400.0, 300.0));
                 let input = egui::RawInput { screen_rect: Some(screen), events, ..Default::default() };
                 let mut drawn = context.run_ui(input, |ui| {
@@ -218,9 +220,11 @@ mod tests {
             }
             (zoom, wheel)
         };
-        let (zoom, wheel) = turned(egui::Modifiers::COMMAND | egui::Modifiers::CTRL);
-        assert!(zoom > 1.02 && wheel == 0.0, "{zoom} {wheel}");
-        let (zoom, wheel) = turned(egui::Modifiers::NONE);
+        for modifiers in [egui::Modifiers::NONE, egui::Modifiers::COMMAND | egui::Modifiers::CTRL] {
+            let (zoom, wheel) = turned(modifiers);
+            assert!(zoom > 1.02 && wheel == 0.0, "{zoom} {wheel}");
+        }
+        let (zoom, wheel) = turned(egui::Modifiers::SHIFT);
         assert!(zoom == 1.0 && wheel > 1.0, "{zoom} {wheel}");
     }
 

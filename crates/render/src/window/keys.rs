@@ -35,6 +35,7 @@ pub(crate) enum Command {
     #[cfg(feature = "sound")]
     Mute,
     Help,
+    Close,
     Quit,
 }
 
@@ -68,15 +69,16 @@ pub(crate) const KEYS: &[(Key, Command, &str)] = &[
     (Key::Z, Command::Mute, "No sound"),
     (Key::F1, Command::Help, "Keys"),
     (Key::Questionmark, Command::Help, "Keys"),
-    (Key::Q, Command::Quit, "Quit"),
-    (Key::Escape, Command::Quit, "Close the page of keys, or quit"),
+    (Key::Escape, Command::Close, "Close what is open, or draw the tool back"),
+    (Key::Q, Command::Quit, "End"),
 ];
 
 /// Mouse actions, and keys that are not in [`KEYS`].
-const REST: [(&str, &str); 10] = [
+const REST: [(&str, &str); 11] = [
     ("pointer", "The tool flies over what is under it"),
     ("left button", "Lowers the tool and pushes; dragged, slides; with Shift tilts the shaft"),
-    ("wheel", "Pushes the tool in or pulls it out, finely; with Ctrl zooms to the pointer"),
+    ("wheel", "Zooms to the pointer; with Shift pushes the tool in or pulls it out, finely"),
+    ("slices", "A click sets the point through which they pass, the wheel turns pages; nothing is cut"),
     ("right drag", "Orbits the view"),
     ("middle drag", "Pans the view; so does Shift + right drag"),
     ("arrows, Page Up and Down", "Move the tool by half a millimetre"),
@@ -134,6 +136,24 @@ pub(crate) fn help(context: &egui::Context, actions: &[Action]) {
             });
         });
     });
+}
+
+/// The question whether the session shall end; returns the answer once there is one.
+pub(crate) fn end(context: &egui::Context) -> Option<bool> {
+    let middle = egui::Align2::CENTER_CENTER;
+    let page =
+        egui::Window::new(tr("End the operation?")).collapsible(false).resizable(false).anchor(middle, [0.0, 0.0]);
+    let mut answer = context.input(|input| input.key_pressed(Key::Enter)).then_some(true);
+    page.show(context, |ui| {
+        ui.label(RichText::new(tr("The report is written and shown; it cannot go on after that.")).size(15.0));
+        ui.horizontal(|ui| {
+            let end = RichText::new(tr("End and write the report (Enter)")).strong().color(egui::Color32::BLACK);
+            let end = ui.add(egui::Button::new(end).fill(SKY).min_size(egui::vec2(120.0, 34.0)));
+            let on = egui::Button::new(tr("Go on operating (Esc)")).min_size(egui::vec2(120.0, 34.0));
+            answer = answer.or(ui.add(on).clicked().then_some(false)).or(end.clicked().then_some(true));
+        });
+    });
+    answer
 }
 
 #[cfg(test)]

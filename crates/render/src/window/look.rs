@@ -5,6 +5,7 @@ use super::words::tr;
 use crate::{Camera, Cut, Frame, Overlay, SliceLook, Stereo, StereoLook};
 use eframe::egui;
 use glam::Vec3;
+use trepan_geometry::Aabb;
 
 /// The view's switches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub(crate) struct Look {
     /// The inactive camera: the microscope's or the orbiting one.
     other: Option<Camera>,
     microscope: bool,
+    /// The box that named views frame.
+    head: Option<Aabb>,
 }
 
 /// A section plane near the tool's tip.
@@ -42,14 +45,8 @@ const ACROSS: [(&str, Option<Vec3>); 4] =
 /// Ratio of the target's distance to the eye distance, for comfort.
 const EYES_AWAY: f32 = 30.0;
 
-/// Share of the microscope's field in which the tool moves without the view.
-const QUIET: f32 = 0.4;
-
-/// Looks at the camera's target from a direction of the patient.
-fn turn(camera: &mut Camera, towards_eye: Vec3) {
-    let Camera { target, distance_mm, fov_rad, .. } = *camera;
-    *camera = Camera { fov_rad, ..Camera::viewed_from(target, towards_eye, distance_mm) };
-}
+/// Share of a view's height that the whole head fills.
+const FILLED: f32 = 0.9;
 
 impl Section {
     const FIRST: Self = Self { across: 0, offset_mm: 0.0, bone: true };
@@ -71,8 +68,9 @@ impl Section {
 }
 
 impl Look {
-    /// Shows everything with the orbiting camera; the microscope needs a camera.
-    pub fn with(microscope: Option<Camera>) -> Self {
+    /// Shows everything with the orbiting camera; the microscope needs a camera. Named views frame
+    /// the box of the head.
+    pub fn with(microscope: Option<Camera>, head: Option<Aabb>) -> Self {
         Self {
             bone: true,
             brain: true,
@@ -84,6 +82,7 @@ impl Look {
             apart: false,
             other: microscope,
             microscope: false,
+            head,
         }
     }
 
@@ -100,7 +99,12 @@ impl Look {
             overlay: if self.hints { frame.overlay } else { Overlay::default() },
             cut: self.section.map(|section| section.cut(&frame)).or(frame.cut),
             stereo: self.stereo.map(eyes).or(frame.stereo),
-            slices: SliceLook { half_height_mm, shown, ..self.slices },
+            slices: SliceLook {
+                half_height_mm,
+                shown,
+                through: self.slices.through.or(frame.slices.through),
+                ..self.slices
+            },
             ..frame
         }
     }
@@ -122,13 +126,24 @@ impl Look {
                 }
             }
             Command::Microscope => self.change_camera(camera),
-            Command::Front => turn(camera, Vec3::Y),
-            Command::Back => turn(camera, Vec3::NEG_Y),
-            Command::Left => turn(camera, Vec3::NEG_X),
-            Command::Right => turn(camera, Vec3::X),
-            Command::Top => turn(camera, Vec3::Z),
+            Command::Front => self.turn(camera, Vec3::Y),
+            Command::Back => self.turn(camera, Vec3::NEG_Y),
+            Command::Left => self.turn(camera, Vec3::NEG_X),
+            Command::Right => self.turn(camera, Vec3::X),
+            Command::Top => self.turn(camera, Vec3::Z),
             _ => (),
         }
+    }
+
+    /// Frames the whole head from a direction of the patient, with the orbiting camera.
+    fn turn(&mut self, camera: &mut Camera, towards_eye: Vec3) {
+        if self.microscope {
+            self.change_camera(camera);
+        }
+        let Some(head) = self.head else { return };
+        let from = Camera::viewed_from(head.centre(), towards_eye, 1.0);
+        let distance_mm = 0.5 * head.size().max_element() / (FILLED * (0.5 * from.fov_rad).tan());
+        *camera = Camera { distance_mm, ..from };
     }
 
     /// Switches to the other camera.
@@ -144,15 +159,6 @@ impl Look {
         self.other.is_some()
     }
 
-    /// Moves the microscope's view after the tool's tip.
-    pub fn follow(&self, camera: &mut Camera, tip: Vec3) {
-        if self.microscope && tip.is_finite() {
-            let way = tip - camera.target;
-            let still_mm = QUIET * camera.distance_mm * (0.5 * camera.fov_rad).tan();
-            camera.target += way - way.clamp_length_max(still_mm);
-        }
-    }
-
     /// The camera that a reset restores.
     pub fn home(&self, orbit: Camera, microscope: Option<Camera>) -> Camera {
         microscope.filter(|_| self.microscope).unwrap_or(orbit)
@@ -160,6 +166,11 @@ impl Look {
 
     /// The switches in the panel, and the standard views.
     pub fn show(&mut self, ui: &mut egui::Ui, camera: &mut Camera) {
+        let mut microscope = self.microscope;
+        ui.add_enabled_ui(self.other.is_some(), |ui| ui.checkbox(&mut microscope, label(Command::Microscope)));
+        if microscope != self.microscope {
+            self.change_camera(camera);
+        }
         ui.horizontal_wrapped(|ui| {
             for command in [Command::Front, Command::Back, Command::Left, Command::Right, Command::Top] {
                 if ui.button(label(command)).on_hover_text(tr("looks from this side of the patient")).clicked() {
@@ -174,11 +185,6 @@ impl Look {
             ui.add_enabled(self.slices.shown, egui::Checkbox::new(&mut self.apart, label(Command::Apart)));
             ui.checkbox(&mut self.hints, label(Command::Hints));
         });
-        let mut microscope = self.microscope;
-        ui.add_enabled_ui(self.other.is_some(), |ui| ui.checkbox(&mut microscope, label(Command::Microscope)));
-        if microscope != self.microscope {
-            self.change_camera(camera);
-        }
         ui.horizontal_wrapped(|ui| {
             ui.label(label(Command::Stereo));
             let ways = [
@@ -201,8 +207,11 @@ impl Look {
     }
 
     fn grey_values(&mut self, ui: &mut egui::Ui) {
-        let SliceLook { level_hu, width_hu, mri_share, .. } = &mut self.slices;
+        let SliceLook { level_hu, width_hu, mri_share, through, .. } = &mut self.slices;
         ui.checkbox(&mut self.whole, tr("Slices of the whole head"));
+        if ui.add_enabled(through.is_some(), egui::Button::new(tr("Slices follow the tool again"))).clicked() {
+            *through = None;
+        }
         ui.add(egui::Slider::new(level_hu, -1000.0..=2000.0).step_by(10.0).text(tr("level, HU")));
         ui.add(egui::Slider::new(width_hu, 50.0..=4000.0).step_by(10.0).text(tr("window, HU")));
         ui.add(egui::Slider::new(mri_share, 0.0..=1.0).fixed_decimals(2).text(tr("MRI over CT")));
@@ -219,7 +228,7 @@ mod tests {
         let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
         let near = SliceLook { half_height_mm: Some(60.0), ..SliceLook::default() };
         let session = Frame { show_bone: false, slices: near, ..Frame::of(camera) };
-        let mut look = Look::with(None);
+        let mut look = Look::with(None, None);
         assert_eq!(look.on(session).slices, near);
         look.react(Command::Brain, &mut { camera });
         look.whole = true;
@@ -230,7 +239,7 @@ mod tests {
     #[test]
     fn a_section_is_at_the_tip_and_stereo_goes_round() {
         let mut camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 300.0);
-        let mut look = Look::with(None);
+        let mut look = Look::with(None, None);
         let frame = Frame::of(camera);
         look.react(Command::Section, &mut camera);
         let cut = look.on(frame).cut.unwrap();
@@ -250,32 +259,32 @@ mod tests {
     }
 
     #[test]
-    fn standard_views_look_from_the_patients_side_and_the_microscope_follows_the_tool() {
-        let mut camera = Camera::viewed_from(Vec3::ONE, Vec3::Y, 200.0);
+    fn standard_views_frame_the_whole_head_from_the_patients_side() {
+        let head = Aabb { min: Vec3::new(-80.0, -100.0, -120.0), max: Vec3::new(80.0, 90.0, 110.0) };
+        let mut camera = Camera::viewed_from(Vec3::new(60.0, 20.0, 70.0), Vec3::Y, 30.0);
         let scope = Camera { fov_rad: 0.2, ..camera };
-        let mut look = Look::with(Some(scope));
-        look.react(Command::Left, &mut camera);
-        assert!((camera.view(1.0).forward - Vec3::X).length() < 1e-5, "from the patient's left, RAS");
-        assert_eq!((camera.target, camera.distance_mm), (Vec3::ONE, 200.0));
-        let tip = Vec3::new(30.0, 0.0, 0.0);
-        look.follow(&mut camera, tip);
-        assert_eq!(camera.target, Vec3::ONE, "the orbiting camera does not");
+        let mut look = Look::with(Some(scope), Some(head));
         look.react(Command::Microscope, &mut camera);
-        look.follow(&mut camera, tip);
-        assert!((camera.target.distance(tip) - QUIET * 200.0 * 0.1f32.tan()).abs() < 1e-3);
+        look.react(Command::Left, &mut camera);
+        let view = camera.view(1.0);
+        assert!((view.forward - Vec3::X).length() < 1e-5, "from the patient's left, RAS");
+        assert!(!look.microscope && camera.target == head.centre());
+        let corner = |n: usize| Vec3::from([0, 1, 2].map(|a| [head.min, head.max][n >> a & 1][a]));
+        let seen = |n: usize| view.project(corner(n)).0.abs().max_element();
+        assert!((0..8).all(|n| seen(n) < 1.4) && (0..8).any(|n| seen(n) > 0.7), "the head fills the view");
     }
 
     #[test]
     fn each_camera_keeps_its_position() {
         let orbit = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
         let scope = Camera { fov_rad: 0.2, ..Camera::viewed_from(Vec3::ONE, Vec3::Z, 300.0) };
-        let (mut camera, mut look) = (orbit, Look::with(Some(scope)));
+        let (mut camera, mut look) = (orbit, Look::with(Some(scope), None));
         camera.zoom(2.0);
         look.react(Command::Microscope, &mut camera);
         assert_eq!((camera, look.home(orbit, Some(scope))), (scope, scope));
         look.react(Command::Microscope, &mut camera);
         assert_eq!((camera.distance_mm, look.home(orbit, Some(scope))), (400.0, orbit));
-        let mut without = Look::with(None);
+        let mut without = Look::with(None, None);
         without.react(Command::Microscope, &mut camera);
         assert_eq!(camera.distance_mm, 400.0);
     }

@@ -6,12 +6,13 @@
 //! | pointer | the tool flies over what is under it |
 //! | left button | lowers the tool, runs it, pushes at the set feed; a drag slides along |
 //! | Shift + left drag | tilts the shaft |
-//! | wheel | pushes the tool in or pulls it out along its shaft; with Ctrl zooms to the pointer |
+//! | wheel | zooms to the pointer; with Shift pushes the tool in or pulls it out along its shaft |
+//! | slices | a click sets the point through which they pass, the wheel turns pages |
 //! | right drag; middle drag or Shift + right drag | orbits; pans |
 //! | Space (held) | the drill's pedal |
 //! | 1 to 9, N | takes a tool; the next tool |
 //! | U, Y, X | undoes a stroke; redoes it; draws the tool back |
-//! | D, F2 to F6 | centres the view on the tool; views from the front, back, left, right, top |
+//! | D, F2 to F6 | centres the view on the tool; the whole head from the front, back, left, right, top |
 //! | I, F11 | light or dark; full screen |
 //! | arrows, Page Up, Page Down | move the tool by half a millimetre |
 //! | + and -, R | zoom; back to the first view |
@@ -21,7 +22,8 @@
 //! | P, V | a picture of the window for the session to keep; every picture |
 //! | L, F1 or ? | large type; all keys on a page |
 //! | Space, \[ and \] | in a replay: run or stand still, to the event before and after |
-//! | Q or Escape | closes |
+//! | Q | asks once, then ends the session; closes a replay |
+//! | Escape | closes what is open, or draws the tool back; never ends |
 //!
 //! The picture stays on the device: egui shows the renderer's own texture. Where that is impossible
 //! (a GL device, a device that cannot present on this display, or rendering on the processor) the
@@ -53,6 +55,7 @@ mod plot;
 mod pointer;
 mod quality;
 mod screen;
+mod slices;
 #[cfg(test)]
 mod spoken;
 mod surface;

@@ -117,8 +117,8 @@ pub struct Amount {
 pub struct Picture<A> {
     /// Name for people who do not see it.
     pub name: String,
-    /// The picture; an equal number means that it did not change.
-    pub image: (u64, Arc<Image>),
+    /// The picture; the same allocation means that it did not change.
+    pub image: Arc<Image>,
     /// Largest height, points.
     pub height: f32,
     /// Letters on it: position as a share of width and height, text.
@@ -182,21 +182,20 @@ const PICTURE_LEAST: f32 = 120.0;
 
 /// Pictures of pages as textures of the window.
 #[derive(Default)]
-pub(crate) struct Textures(Vec<(String, u64, egui::TextureHandle)>);
+pub(crate) struct Textures(Vec<(String, Arc<Image>, egui::TextureHandle)>);
 
 impl Textures {
     fn of<A>(&mut self, ui: &egui::Ui, picture: &Picture<A>) -> egui::TextureId {
-        let (number, image) = &picture.image;
+        let image = &picture.image;
         let known = self.0.iter().position(|(name, ..)| *name == picture.name);
-        if let Some((_, shown, texture)) = known.map(|at| &self.0[at]).filter(|(_, shown, _)| shown == number) {
-            debug_assert_eq!(shown, number);
+        if let Some((.., texture)) = known.map(|at| &self.0[at]).filter(|(_, shown, _)| Arc::ptr_eq(shown, image)) {
             return texture.id();
         }
         known.map(|at| self.0.swap_remove(at));
         let size = [image.width as usize, image.height as usize];
         let colours = egui::ColorImage::from_rgba_unmultiplied(size, &image.rgba);
         let texture = ui.ctx().load_texture(&picture.name, colours, egui::TextureOptions::LINEAR);
-        self.0.push((picture.name.clone(), *number, texture));
+        self.0.push((picture.name.clone(), image.clone(), texture));
         self.0[self.0.len() - 1].2.id()
     }
 }
@@ -402,7 +401,7 @@ fn slide<A>(ui: &mut egui::Ui, amount: &Amount, does: fn(f32) -> A, done: &mut V
 /// Shows a picture that is not wider than `widest` points.
 fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut Textures, done: &mut Vec<A>) {
     let id = textures.of(ui, picture);
-    let image = &picture.image.1;
+    let image = &picture.image;
     let shape = image.width as f32 / image.height.max(1) as f32;
     let width = ui.max_rect().width().min(widest).min(picture.height * shape).max(16.0);
     let size = egui::vec2(width, width / shape);

@@ -9,7 +9,7 @@ use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, LazyRenderer};
 use glam::Vec3;
 use std::sync::Arc;
-use trepan_geometry::Tool;
+use trepan_geometry::{Aabb, Tool};
 use trepan_gpu::{GpuError, Texture};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -59,6 +59,10 @@ impl Draws for TestPainter {
 
     fn texture(&self) -> Option<&Texture> {
         None
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.0.bounds()
     }
 
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
@@ -324,7 +328,7 @@ fn large_type_makes_everything_larger_and_nothing_is_lost() {
 }
 
 #[test]
-fn the_page_of_keys_opens_and_escape_closes_it_before_the_window() {
+fn the_page_of_keys_opens_and_escape_closes_it_and_never_the_window() {
     let mut bench = Bench::with(Panel::default());
     assert!(!bench.shows("Keys and mouse"));
     bench.press(Key::Questionmark);
@@ -332,9 +336,69 @@ fn the_page_of_keys_opens_and_escape_closes_it_before_the_window() {
     assert!(bench.shows("Keys and mouse") && bench.shows("Save every picture of the window"));
     bench.press(Key::Escape);
     assert!(!bench.shows("Keys and mouse") && !bench.closes());
-    bench.window.key_down(Key::Escape);
+    (0..3).for_each(|_| _ = bench.press(Key::Escape));
+    assert!(!bench.closes());
+}
+
+#[test]
+fn ending_asks_once_and_can_be_taken_back() {
+    let mut bench = Bench::in_hand();
+    bench.press(Key::Q);
+    assert!(bench.shows("End the operation?") && !bench.closes());
+    bench.press(Key::Escape);
+    bench.window.run_steps(2);
+    assert!(!bench.shows("End the operation?") && !bench.closes(), "taken back");
+    bench.click("End the operation");
+    bench.click("Go on operating (Esc)");
+    assert!(!bench.closes());
+    bench.press(Key::Q);
+    bench.window.key_down(Key::Enter);
     bench.window.step();
     assert!(bench.closes());
+    let timeline = Timeline { at_s: 0.0, length_s: 1.0, ready_s: 1.0, running: false, speed: 1.0, marks: [].into() };
+    let mut replay = Bench::with(Panel { timeline: Some(timeline), ..Panel::default() });
+    replay.window.key_down(Key::Q);
+    replay.window.step();
+    assert!(replay.closes(), "closing a replay loses nothing");
+}
+
+#[test]
+fn a_click_on_a_slice_moves_the_slices_and_never_the_tool() {
+    let mut bench = Bench::in_hand();
+    bench.window.run_steps(2);
+    let before = bench.last_input().world_from_tool;
+    let button = |pos, pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Default::default(),
+    };
+    // The middle of the axial slice, beside a view as wide as it is high.
+    let at = egui::pos2(955.0, 150.0);
+    bench.window.event(Event::PointerMoved(at));
+    bench.window.step();
+    let before_press = bench.last_input().world_from_tool;
+    bench.window.event(button(at, true));
+    bench.window.run_steps(8);
+    let held = bench.last_input();
+    assert!(!held.pedal && held.world_from_tool == before_press, "{before:?} {held:?}");
+    let through = bench.last_request().slices.through.expect("the click chose a point");
+    bench.window.event(Event::PointerMoved(at + egui::vec2(20.0, 0.0)));
+    bench.window.run_steps(2);
+    let dragged = bench.last_request().slices.through.unwrap();
+    assert!((dragged - through).length() > 0.1 && !bench.last_input().pedal);
+    bench.window.event(button(at, false));
+    bench.window.step();
+    let (unit, delta, phase) = (egui::MouseWheelUnit::Line, egui::vec2(0.0, 3.0), egui::TouchPhase::Move);
+    let source = egui::MouseWheelSource::Unknown;
+    bench.window.event(Event::MouseWheel { unit, delta, phase, source, modifiers: Default::default() });
+    let camera = bench.last_request().camera;
+    bench.window.run_steps(6);
+    let request = bench.last_request();
+    let paged = request.slices.through.unwrap() - dragged;
+    assert!(paged.z.abs() > 0.5 && paged.x.abs() + paged.y.abs() < 1e-3 && request.camera == camera, "{paged}");
+    bench.click("Slices follow the tool again");
+    assert_eq!(bench.last_request().slices.through, None);
 }
 
 #[test]
@@ -447,8 +511,9 @@ fn every_key_answers_on_screen_whether_it_applies_or_not() {
         no_drill: refused,
         ..Panel::default()
     };
-    // Keys that move tool or view at once, or belong to the focused control.
-    let moves = "ArrowDown ArrowLeft ArrowRight ArrowUp PageUp PageDown Plus Minus Equals Tab Enter Home End";
+    // Keys that move tool or view at once, belong to the focused control, or only modify others.
+    let moves = "ArrowDown ArrowLeft ArrowRight ArrowUp PageUp PageDown Plus Minus Equals Tab Enter Home End \
+                 ShiftLeft ShiftRight ControlLeft ControlRight AltLeft AltRight SuperLeft SuperRight CapsLock";
     for panel in [by_hand, Panel { choices: vec![choice], ..Panel::default() }] {
         let mut bench = Bench::with(panel);
         for &key in Key::ALL {
@@ -542,7 +607,7 @@ fn page() -> Page<&'static str> {
     let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
     let picture = Picture {
         name: "head".into(),
-        image: (1, image),
+        image,
         height: 200.0,
         letters: vec![([0.1, 0.5], "R".into())],
         clicked: Some(|_| "clicked"),
@@ -623,8 +688,7 @@ fn a_drag_over_a_picture_keeps_every_place_while_the_page_changes() {
     let page = |drags: &Vec<Drag>| {
         let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
         let (letters, clicked) = (Vec::new(), None);
-        let picture =
-            Picture { name: "head".into(), image: (1, image), height: 200.0, letters, clicked, dragged: Some(|d| d) };
+        let picture = Picture { name: "head".into(), image, height: 200.0, letters, clicked, dragged: Some(|d| d) };
         // Its height grows past the window, so that its parts are laid out another way.
         let notes = (0..40 * drags.len().min(1)).map(|n| Item::Note(format!("note {n}")));
         let column = [Item::Picture(picture)].into_iter().chain(notes).collect();
