@@ -130,6 +130,9 @@ impl TissueClass {
     }
 }
 
+/// Least share of a label volume that must lie in the brain, numerical.
+const LEAST_INSIDE: f64 = 0.5;
+
 /// Label volume of a class: `CLASS=PATH`, or `CLASS=PATH:LABEL,LABEL` if only some labels, codes or
 /// names of segments, belong to it.
 #[derive(Clone, Debug, PartialEq)]
@@ -145,6 +148,11 @@ pub struct TissueSource {
 }
 
 impl TissueSource {
+    /// All nonzero voxels of a label volume.
+    pub fn all_of(class: TissueClass, path: PathBuf) -> Self {
+        Self { class, path, codes: Vec::new(), names: Vec::new() }
+    }
+
     /// The ventricles in a FreeSurfer segmentation (lateral, inferior lateral, third, fourth).
     pub fn ventricles_of_aseg(path: PathBuf) -> Self {
         Self { class: TissueClass::Ventricle, path, codes: vec![4, 5, 14, 15, 43, 44], names: Vec::new() }
@@ -234,6 +242,12 @@ impl TissueSource {
                 "--tissue {name}: {}: {} fill {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and labels that are in them",
                 self.path.display(),
                 self.labels()
+            )));
+        }
+        if ml < LEAST_INSIDE * all_ml {
+            return Err(SessionError::Case(format!(
+                "--tissue {name}: {}: only {ml:.1} ml of its {all_ml:.1} ml lie in the brain, so it may be another patient's: give labels in the MRI's space, or a brain that contains them with --labels PATH",
+                self.path.display()
             )));
         }
         Ok(format!("{name}: {ml:.1} ml of the {all_ml:.1} ml that its labels fill lie in the brain"))

@@ -64,6 +64,7 @@ pub(crate) fn refusal(command: Command, panel: &Panel, look: &Look) -> Option<St
         Command::Undo => led().or_else(|| panel.no_undo.clone()),
         Command::Redo => led().or_else(|| panel.no_redo.clone()),
         Command::Apart if !look.slices.shown => Some("the slices are switched off".into()),
+        Command::Bone if panel.no_bone => Some("there is no bone here".into()),
         Command::Microscope if !look.has_microscope() => Some("this view has no microscope".into()),
         _ => None,
     }

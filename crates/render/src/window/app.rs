@@ -28,7 +28,7 @@ const LONGEST_S: f32 = 0.4;
 /// Largest height of the slices' own window, points.
 const SLICES_HIGH: f32 = 900.0;
 /// Scale of large type.
-const LARGE: f32 = 1.4;
+pub(super) const LARGE: f32 = 1.4;
 
 /// The application behind the window.
 pub(super) struct Window<S, D> {
@@ -44,7 +44,6 @@ pub(super) struct Window<S, D> {
     /// The tool's tip as contact allows it, world mm.
     tip: Vec3,
     help: bool,
-    large: bool,
     playback: Option<Playback>,
     #[cfg(feature = "sound")]
     audio: super::loudspeaker::AudioOutput,
@@ -59,6 +58,11 @@ pub(super) struct Window<S, D> {
     /// Whether the user is asked if the session shall end.
     asks: bool,
     over: bool,
+}
+
+/// Whether type is large, in sessions and on pages alike.
+fn is_large(ui: &egui::Ui) -> bool {
+    ui.ctx().zoom_factor() > 1.0
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
@@ -77,7 +81,6 @@ impl<S: Session, D: Draws> Window<S, D> {
             answers: Answers::default(),
             tip: start.world_from_tool.translation,
             help: false,
-            large: false,
             playback: None,
             #[cfg(feature = "sound")]
             audio: Default::default(),
@@ -164,7 +167,7 @@ impl<S: Session, D: Draws> Window<S, D> {
                 Command::Quit => self.asks = true,
                 of_view => self.look.react(of_view, &mut self.hand.camera),
             }
-            self.answers.give(answers::done(command, keys::name(command), &self.look, self.large), now);
+            self.answers.give(answers::done(command, keys::name(command), &self.look, is_large(ui)), now);
         }
         commands.retain(|command| answers::refusal(*command, &self.panel, &self.look).is_none());
         self.clicks.commands = commands;
@@ -188,8 +191,7 @@ impl<S: Session, D: Draws> Window<S, D> {
     }
 
     fn enlarge(&mut self, ui: &egui::Ui) {
-        self.large ^= true;
-        ui.set_zoom_factor(if self.large { LARGE } else { 1.0 });
+        ui.set_zoom_factor(if is_large(ui) { 1.0 } else { LARGE });
     }
 
     fn light(&mut self, ui: &egui::Ui) {

@@ -206,8 +206,6 @@ impl<H: Host> Pages<H> {
         if !dropped.is_empty() {
             host.dropped(dropped.into_iter().map(|file| file.path().to_path_buf()).collect());
         }
-        // Pages are drawn for dark rooms, whatever the session's theme is.
-        let theme = std::mem::replace(ui.visuals_mut(), egui::Visuals::dark());
         let actions = match host.shown(guest.is_some()) {
             Shown::Page(page) => {
                 guest.take().into_iter().for_each(Guest::leave);
@@ -222,7 +220,6 @@ impl<H: Host> Pages<H> {
                     let panel = egui::Panel::top("strip").resizable(false).max_size(260.0);
                     panel.show(ui, |ui| page::strip(ui, &page, &mut self.textures)).inner
                 });
-                *ui.visuals_mut() = theme;
                 if let Some(mut shown) = guest.take() {
                     shown.window.show(ui, state);
                     if shown.window.is_over() { shown.leave() } else { *guest = Some(shown) }

@@ -165,7 +165,7 @@ impl Look {
     }
 
     /// The switches in the panel, and the standard views.
-    pub fn show(&mut self, ui: &mut egui::Ui, camera: &mut Camera) {
+    pub fn show(&mut self, ui: &mut egui::Ui, camera: &mut Camera, no_bone: bool) {
         let mut microscope = self.microscope;
         ui.add_enabled_ui(self.other.is_some(), |ui| ui.checkbox(&mut microscope, label(Command::Microscope)));
         if microscope != self.microscope {
@@ -179,7 +179,9 @@ impl Look {
             }
         });
         ui.horizontal_wrapped(|ui| {
-            ui.checkbox(&mut self.bone, label(Command::Bone));
+            if !no_bone {
+                ui.checkbox(&mut self.bone, label(Command::Bone));
+            }
             ui.checkbox(&mut self.brain, label(Command::Brain));
             ui.checkbox(&mut self.slices.shown, label(Command::Slices));
             ui.add_enabled(self.slices.shown, egui::Checkbox::new(&mut self.apart, label(Command::Apart)));

@@ -223,6 +223,7 @@ fn open_on(title: &str, gpu: Option<&Gpu>, size: [f32; 2], create: &Create<'_>) 
     let show = || {
         let create: eframe::AppCreator<'_> = Box::new(|context| {
             context.egui_ctx.set_theme(eframe::egui::Theme::Dark);
+            context.egui_ctx.all_styles_mut(readable);
             Ok(create(gpu))
         });
         eframe::run_native(title, options(gpu, size), create)
@@ -234,6 +235,14 @@ fn open_on(title: &str, gpu: Option<&Gpu>, size: [f32; 2], create: &Create<'_>) 
         Ok(Err(e)) => Err(WindowError::Failed(e.to_string())),
         Err(panic) => Err(WindowError::Failed(words(panic.as_ref()))),
     }
+}
+
+/// Smallest text of the window, points.
+const SMALLEST: f32 = 11.0;
+
+/// Makes no text smaller than can be read.
+fn readable(style: &mut eframe::egui::Style) {
+    style.text_styles.values_mut().for_each(|font| font.size = font.size.max(SMALLEST));
 }
 
 /// Checks whether a display is configured.

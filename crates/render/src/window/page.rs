@@ -8,7 +8,8 @@
 //! # When not to use it
 //! For a running session: its picture and panel are a [`Session`](super::Session).
 
-use super::palette::{GREEN, ORANGE, PALE, SKY, VERMILION};
+use super::app::LARGE;
+use super::palette::{GREEN, ORANGE, SKY, VERMILION, ink, legible, pale};
 use super::words::tr;
 use crate::Image;
 use eframe::egui::{self, Color32, RichText};
@@ -57,6 +58,10 @@ pub enum Item<A> {
     Button(Button<A>),
     /// Parts beside each other, which wrap.
     Row(Vec<Item<A>>),
+    /// Free space in a row, as wide as a picture beside it.
+    Gap,
+    /// Switches for large letters and light colours, of the whole window.
+    Look,
     /// One of several options: name, options, index of the chosen one.
     Choice(String, Vec<Choosable>, usize, fn(usize) -> A),
     /// A line of text: name, value, what stands in the empty field.
@@ -127,6 +132,8 @@ pub struct Picture<A> {
     pub clicked: Option<fn([f32; 2]) -> A>,
     /// The action of a drag.
     pub dragged: Option<fn(Drag) -> A>,
+    /// The action of the wheel, by notches; the page does not scroll under it.
+    pub scrolled: Option<fn(f32) -> A>,
 }
 
 /// What a drag over a picture did since the last time.
@@ -166,8 +173,6 @@ impl<A> Item<A> {
     }
 }
 
-/// Colour of text.
-const INK: Color32 = Color32::from_gray(225);
 /// Width of a column below which columns stand below each other, points.
 const NARROW: f32 = 300.0;
 /// Largest width of a page of one, two and three columns, points.
@@ -177,6 +182,11 @@ const ABOVE: f32 = 0.35;
 /// Space around parts, and between columns, points.
 const GAP: f32 = 8.0;
 const BETWEEN: f32 = 28.0;
+/// Name of the time at which a picture took the wheel, and for how long it keeps it, s.
+const WHEEL: &str = "wheel over a picture";
+const WHEEL_S: f64 = 0.3;
+/// Points scrolled per notch of the wheel.
+const NOTCH: f32 = 40.0;
 /// Least width of a picture beside others, points.
 const PICTURE_LEAST: f32 = 120.0;
 
@@ -238,7 +248,7 @@ fn parts<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures, f
     }
     ui.label(RichText::new(tr(&page.title)).size(26.0).strong());
     if !page.line.is_empty() {
-        ui.label(RichText::new(tr(&page.line)).size(15.0).color(PALE));
+        ui.label(RichText::new(tr(&page.line)).size(15.0).color(pale(ui)));
     }
     ui.separator();
     let mut height = ui.cursor().top() - top + GAP;
@@ -246,7 +256,10 @@ fn parts<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut Textures, f
         let panel = egui::Panel::bottom("foot").resizable(false).frame(egui::Frame::NONE);
         height += panel.show(ui, |ui| foot(ui, page, textures, &mut done)).inner;
     }
-    let scroll = egui::ScrollArea::vertical().auto_shrink([false, floats]);
+    let (taken, now) = (ui.data(|data| data.get_temp::<f64>(egui::Id::unique(WHEEL))), ui.input(|input| input.time));
+    let mouse_wheel = taken.is_none_or(|at| now - at > WHEEL_S);
+    let source = egui::containers::scroll_area::ScrollSource { mouse_wheel, ..Default::default() };
+    let scroll = egui::ScrollArea::vertical().auto_shrink([false, floats]).scroll_source(source);
     let content = scroll.show(ui, |ui| columns(ui, page, textures, &mut done)).content_size;
     if floats && !page.foot.is_empty() {
         ui.add_space(GAP);
@@ -285,18 +298,18 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
     match item {
         Item::Heading(text) => {
             ui.add_space(8.0);
-            ui.label(RichText::new(tr(text)).size(18.0).strong().color(SKY));
+            ui.label(RichText::new(tr(text)).size(18.0).strong().color(legible(ui, SKY)));
         }
-        Item::Text(text) => paragraph(ui, RichText::new(tr(text)).size(15.0).color(INK)),
-        Item::Note(text) => paragraph(ui, RichText::new(tr(text)).color(PALE)),
+        Item::Text(text) => paragraph(ui, RichText::new(tr(text)).size(15.0).color(ink(ui))),
+        Item::Note(text) => paragraph(ui, RichText::new(tr(text)).color(pale(ui))),
         Item::Verdict(passed, text) => {
-            let colour = if *passed { GREEN } else { ORANGE };
+            let colour = legible(ui, if *passed { GREEN } else { ORANGE });
             paragraph(ui, RichText::new(tr(text)).size(18.0).strong().color(colour));
         }
         Item::Label(text, [r, g, b]) => {
             let (patch, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
             ui.painter().rect_filled(patch, 2.0, Color32::from_rgb(*r, *g, *b));
-            ui.label(RichText::new(tr(text)).color(INK));
+            ui.label(RichText::new(tr(text)).color(ink(ui)));
         }
         Item::Alert(text) => {
             egui::Frame::new().fill(VERMILION).inner_margin(10.0).show(ui, |ui| {
@@ -305,7 +318,8 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         }
         Item::Button(button) => press(ui, button, done),
         Item::Row(items) => {
-            let pictures = items.iter().filter(|item| matches!(item, Item::Picture(_))).count().max(1) as f32;
+            let is_wide = |item: &&Item<A>| matches!(item, Item::Picture(_) | Item::Gap);
+            let pictures = items.iter().filter(is_wide).count().max(1) as f32;
             let each = (ui.available_width() - GAP * (pictures - 1.0)) / pictures;
             _ = ui.horizontal_wrapped(|ui| {
                 for item in items {
@@ -316,6 +330,8 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
                 }
             });
         }
+        Item::Gap => (),
+        Item::Look => _ = ui.horizontal_wrapped(appearance),
         Item::Choice(name, options, chosen, does) => choose(ui, (name, options, *chosen), *does, done),
         Item::Field(name, value, empty, does) => write(ui, [name, value, empty], *does, done),
         Item::Amount(amount, does) => _ = ui.horizontal_wrapped(|ui| slide(ui, amount, *does, done)),
@@ -325,6 +341,17 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         Item::Picture(picture) => look(ui, picture, f32::INFINITY, textures, done),
         Item::Table(rows) => table(ui, rows),
         Item::Curve(title, values) => curve(ui, title, values),
+    }
+}
+
+/// Switches for large letters and light colours, which hold in sessions too.
+fn appearance(ui: &mut egui::Ui) {
+    let (mut large, mut light) = (ui.ctx().zoom_factor() > 1.0, !ui.visuals().dark_mode);
+    if ui.checkbox(&mut large, tr("Large type")).changed() {
+        ui.set_zoom_factor(if large { LARGE } else { 1.0 });
+    }
+    if ui.checkbox(&mut light, tr("Light")).changed() {
+        ui.set_theme(if light { egui::Theme::Light } else { egui::Theme::Dark });
     }
 }
 
@@ -360,7 +387,7 @@ fn choose<A>(
     done: &mut Vec<A>,
 ) {
     ui.add_space(2.0);
-    ui.label(RichText::new(tr(name)).color(PALE));
+    ui.label(RichText::new(tr(name)).color(pale(ui)));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
         for (at, option) in options.iter().enumerate() {
@@ -379,7 +406,7 @@ fn choose<A>(
 
 fn write<A>(ui: &mut egui::Ui, [name, value, empty]: [&String; 3], does: fn(String) -> A, done: &mut Vec<A>) {
     ui.add_space(2.0);
-    let label = ui.label(RichText::new(tr(name)).color(PALE));
+    let label = ui.label(RichText::new(tr(name)).color(pale(ui)));
     let mut text = value.clone();
     let edit = egui::TextEdit::singleline(&mut text).hint_text(tr(empty)).margin(egui::vec2(8.0, 5.0));
     if ui.add(edit.desired_width(420.0_f32.min(ui.available_width() - 16.0))).labelled_by(label.id).changed() {
@@ -392,7 +419,7 @@ fn slide<A>(ui: &mut egui::Ui, amount: &Amount, does: fn(f32) -> A, done: &mut V
     ui.spacing_mut().slider_width = (0.5 * ui.available_width()).clamp(100.0, 240.0);
     let shown = egui::Slider::new(&mut value, low..=high).step_by(amount.step.into());
     let shown = ui.add(shown.fixed_decimals(if amount.step < 1.0 { 2 } else { 0 }));
-    let name = ui.label(RichText::new(tr(&amount.name)).color(PALE));
+    let name = ui.label(RichText::new(tr(&amount.name)).color(pale(ui)));
     if shown.labelled_by(name.id).changed() {
         done.push(does(value));
     }
@@ -414,11 +441,21 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut 
     for ([x, y], letter) in &picture.letters {
         let at = area.min + egui::vec2(x * area.width(), y * area.height());
         let font = egui::FontId::proportional(16.0);
-        for (shift, colour) in [(egui::vec2(1.0, 1.0), Color32::BLACK), (egui::Vec2::ZERO, Color32::WHITE)] {
+        // On ivory as on black.
+        let around =
+            [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|[x, y]| (egui::vec2(x, y), Color32::BLACK));
+        for (shift, colour) in around.into_iter().chain([(egui::Vec2::ZERO, Color32::WHITE)]) {
             ui.painter().text(at + shift, egui::Align2::CENTER_CENTER, letter, font.clone(), colour);
         }
     }
     let share = |v: egui::Vec2| [v.x / area.width(), v.y / area.height()];
+    let notches = ui.input(|input| input.smooth_scroll_delta().y) / NOTCH;
+    if let Some(does) = picture.scrolled.filter(|_| response.hovered()) {
+        // The page itself does not scroll in the next picture.
+        let now = ui.input(|input| input.time);
+        ui.data_mut(|data| data.insert_temp(egui::Id::unique(WHEEL), now));
+        done.extend((notches != 0.0).then(|| does(notches)));
+    }
     if let (true, Some(does), Some(at)) = (response.clicked(), picture.clicked, response.interact_pointer_pos()) {
         done.push(does(share(at - area.min)));
     }
@@ -446,7 +483,7 @@ fn look<A>(ui: &mut egui::Ui, picture: &Picture<A>, widest: f32, textures: &mut 
 
 fn curve(ui: &mut egui::Ui, title: &str, values: &[f64]) {
     ui.add_space(GAP);
-    ui.label(RichText::new(tr(title)).size(14.0).color(INK));
+    ui.label(RichText::new(tr(title)).size(14.0).color(ink(ui)));
     let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(at, value)| [at as f64 + 1.0, *value]).collect();
     let still = egui_plot::Plot::new(title).height(120.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
     still.show(ui, |plot| {
@@ -462,7 +499,7 @@ fn table(ui: &mut egui::Ui, rows: &[Vec<String>]) {
     grid.show(ui, |ui| {
         for (at, row) in rows.iter().enumerate() {
             for (place, cell) in row.iter().enumerate() {
-                let text = RichText::new(tr(cell)).size(14.0).color(INK);
+                let text = RichText::new(tr(cell)).size(14.0).color(ink(ui));
                 let label = egui::Label::new(if at == 0 { text.strong() } else { text });
                 // Only the first column holds sentences.
                 match place {

@@ -3,7 +3,7 @@
 //! # Sources
 //! Okabe and Ito 2008, "Color universal design". Contrast: WCAG 2.1, at least 4.5 for text.
 
-use eframe::egui::Color32;
+use eframe::egui::{Color32, Ui};
 
 pub(crate) const SKY: Color32 = Color32::from_rgb(86, 180, 233);
 pub(crate) const ORANGE: Color32 = Color32::from_rgb(230, 159, 0);
@@ -13,6 +13,29 @@ pub(crate) const VERMILION: Color32 = Color32::from_rgb(213, 94, 0);
 pub(crate) const NIGHT: Color32 = Color32::from_gray(16);
 /// Secondary text.
 pub(crate) const PALE: Color32 = Color32::from_gray(205);
+
+/// Share of a colour's light that stays on a light background.
+const DARKER: f32 = 0.5;
+
+/// Colour of text on the present background.
+pub(crate) fn ink(ui: &Ui) -> Color32 {
+    if ui.visuals().dark_mode { Color32::from_gray(225) } else { Color32::from_gray(30) }
+}
+
+/// Colour of secondary text on the present background.
+pub(crate) fn pale(ui: &Ui) -> Color32 {
+    if ui.visuals().dark_mode { PALE } else { Color32::from_gray(70) }
+}
+
+/// A colour as it is legible on the present background.
+pub(crate) fn legible(ui: &Ui, colour: Color32) -> Color32 {
+    if ui.visuals().dark_mode { colour } else { darker(colour) }
+}
+
+fn darker(colour: Color32) -> Color32 {
+    let [red, green, blue, _] = colour.to_array().map(|c| (DARKER * f32::from(c)) as u8);
+    Color32::from_rgb(red, green, blue)
+}
 
 #[cfg(test)]
 mod tests {
@@ -34,6 +57,9 @@ mod tests {
         assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 0.01);
         for on_dark in [SKY, ORANGE, GREEN, VERMILION, PALE] {
             assert!(contrast(on_dark, NIGHT) > 4.5, "{on_dark:?}");
+        }
+        for on_light in [SKY, ORANGE, GREEN, VERMILION] {
+            assert!(contrast(darker(on_light), Color32::from_gray(248)) > 4.5, "{on_light:?}");
         }
         assert!(contrast(Color32::BLACK, VERMILION) > 4.5 && contrast(Color32::BLACK, ORANGE) > 4.5);
     }

@@ -66,7 +66,9 @@ pub(crate) fn show(
         ui.label(RichText::new(format!("{} {}", tr("case"), panel.case)).weak());
         ui.label(RichText::new(sentence(&tr(&panel.hint))).size(15.0).strong());
         ui.separator();
-        force(ui, panel, traces);
+        if panel.force_limit_n > 0.0 {
+            force(ui, panel, traces);
+        }
         grid(ui, "task", &panel.task, 16.0);
         ui.separator();
         pedal(ui, panel, &mut clicks);
@@ -75,10 +77,10 @@ pub(crate) fn show(
         }
         buttons(ui, panel, look, &mut clicks);
         if panel.by_hand {
-            by_mouse(ui, &mut hand.guide);
+            by_mouse(ui, &mut hand.guide, panel.no_bone);
         }
         ui.separator();
-        look.show(ui, &mut hand.camera);
+        look.show(ui, &mut hand.camera, panel.no_bone);
         ui.separator();
         if filming {
             ui.label(RichText::new(tr("every picture of the window is saved")).strong().color(ORANGE));
@@ -144,7 +146,7 @@ fn wide(ui: &egui::Ui, text: RichText, height: f32) -> egui::Button<'static> {
 
 /// The button that is held down to drill.
 fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
-    if !panel.by_hand {
+    if !panel.by_hand || panel.no_bone {
         return;
     }
     let name = RichText::new(tr(if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" })).strong();
@@ -194,9 +196,11 @@ fn buttons(ui: &mut egui::Ui, panel: &Panel, look: &Look, clicks: &mut Clicks) {
 }
 
 /// What the left button does.
-fn by_mouse(ui: &mut egui::Ui, guide: &mut Guide) {
-    ui.checkbox(&mut guide.drills, tr("The left button drills"))
-        .on_hover_text(tr("Held down on the skull, the left button lowers the tool, runs it and pushes it in"));
+fn by_mouse(ui: &mut egui::Ui, guide: &mut Guide, no_bone: bool) {
+    if !no_bone {
+        ui.checkbox(&mut guide.drills, tr("The left button drills"))
+            .on_hover_text(tr("Held down on the skull, the left button lowers the tool, runs it and pushes it in"));
+    }
     let feed =
         egui::Slider::new(&mut guide.feed_mm_s, FEEDS).logarithmic(true).fixed_decimals(1).text(tr("feed, mm/s"));
     ui.add(feed).on_hover_text(tr("How fast the held button pushes the tool along its shaft"));

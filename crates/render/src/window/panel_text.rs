@@ -38,6 +38,8 @@ pub struct Panel {
     pub no_undo: Option<String>,
     /// Why nothing can be redone now; `None` where it can.
     pub no_redo: Option<String>,
+    /// Whether there is no bone: nothing of drilling is shown.
+    pub no_bone: bool,
     /// Why the present tool does not drill; `None` where it does.
     pub no_drill: Option<String>,
     /// Further values, in order, with units.

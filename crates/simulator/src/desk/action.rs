@@ -31,6 +31,14 @@ pub(crate) enum Action {
     Path(String),
     /// Takes a file or folder for a purpose.
     Take(Goal, PathBuf),
+    /// Takes a file of the chosen case away.
+    Remove(Goal),
+    /// Chooses a DICOM series of the CT; the first option is the usual one.
+    CtSeries(usize),
+    /// Chooses a DICOM series of the MRI.
+    MriSeries(usize),
+    /// Sets the threshold of bone, HU; 0 takes it from the histogram.
+    Isovalue(f32),
     /// Whether the MRI is registered to the CT: yes is the second option.
     Register(usize),
     /// Forgets the chosen place of the opening.
@@ -63,6 +71,10 @@ pub(crate) enum Action {
     Blend(f32),
     /// Moves the slices along an axis to a place, mm.
     Slide(usize, f32),
+    /// Moves the slices to a place in the one of this number, a share of its edges.
+    Cross(usize, [f32; 2]),
+    /// Turns pages of the slice of this number, by notches.
+    Turn(usize, f32),
     /// Begins the chosen session.
     Begin,
     /// Ends loading.

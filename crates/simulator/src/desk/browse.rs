@@ -14,6 +14,10 @@ pub(crate) enum Goal {
     Ct,
     /// MRI of the patient.
     Mri,
+    /// Label volume of the brain.
+    Labels,
+    /// Label volume of a tumour.
+    Tumour,
     /// A folder that `case build` made.
     Case,
     /// A recording.
@@ -26,6 +30,8 @@ impl Goal {
         match self {
             Self::Ct => "Open a CT",
             Self::Mri => "Open an MRI",
+            Self::Labels => "Open labels of the brain",
+            Self::Tumour => "Open labels of a tumour",
             Self::Case => "Open a case folder",
             Self::Recording => "Open a recording",
         }
@@ -35,6 +41,8 @@ impl Goal {
     pub fn line(self) -> &'static str {
         match self {
             Self::Ct | Self::Mri => "Choose the folder of a DICOM series, or a file: NIfTI, NRRD, MetaImage, DICOM",
+            Self::Labels => "Choose a label volume: every voxel that is not zero is brain",
+            Self::Tumour => "Choose a label volume: every voxel that is not zero is tumour",
             Self::Case => "Choose a folder that holds a case.json",
             Self::Recording => "Choose a recording: a file that ends in .mcap",
         }
@@ -43,7 +51,7 @@ impl Goal {
     /// What a folder without such files means.
     pub fn none(self) -> &'static str {
         match self {
-            Self::Ct | Self::Mri => "no images here: open a folder on the left",
+            Self::Ct | Self::Mri | Self::Labels | Self::Tumour => "no images here: open a folder on the left",
             Self::Case => "a case is a folder: open it on the left",
             Self::Recording => "no recordings here: open a folder on the left",
         }
@@ -53,6 +61,7 @@ impl Goal {
     pub fn takes(self, folder: &Path, files: usize) -> bool {
         match self {
             Self::Ct | Self::Mri => files > 0,
+            Self::Labels | Self::Tumour => false,
             Self::Case => folder.join("case.json").is_file(),
             Self::Recording => false,
         }
@@ -64,8 +73,9 @@ impl Goal {
         let ends = |all: &[&str]| all.iter().any(|end| name.ends_with(end));
         match self {
             // Slices of a DICOM series often have no extension.
-            Self::Ct | Self::Mri => {
-                ends(&[".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm", ".ima"]) || !name.contains('.')
+            Self::Ct | Self::Mri | Self::Labels | Self::Tumour => {
+                ends(&[".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm", ".ima", ".mgz", ".mgh"])
+                    || !name.contains('.')
             }
             Self::Case => false,
             Self::Recording => ends(&[".mcap"]),

@@ -11,6 +11,9 @@ use crate::case::Case;
 use crate::case::opening::eye;
 use crate::case::plan::Plan;
 use crate::desk::action::Action;
+use crate::desk::form::Form;
+use crate::desk::pages::{across_mm, by_controls, images};
+use crate::desk::settings::Source;
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::program::Program;
@@ -27,13 +30,20 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 /// Width and height of the picture of the head, pixels.
 const HEAD: [u32; 2] = [420, 340];
 /// Edge of a slice, pixels.
-const SLICE: u32 = 220;
+const SLICE: u32 = 280;
 /// Grey range of bone, HU, numerical.
 const WINDOW_HU: [f64; 2] = [-200.0, 1500.0];
+/// Share of a turn to the side from which a side counts as turned away, numerical.
+const AWAY: f32 = 0.35;
 /// Least distance of the points of a drawn line, mm, numerical.
 const POINT_MM: f32 = 1.0;
 /// Steps of a ray on its way to the bone, mm, numerical.
 const STEP_MM: f32 = 0.4;
+/// Way of a page of the slices for a notch, mm, numerical.
+const PAGE_MM: f32 = 1.0;
+/// Depth down to which bone and brain are sought, mm, and the largest gap within bone, mm, numerical.
+const DEEPEST_MM: f32 = 60.0;
+const HOLLOW_MM: f32 = 3.0;
 /// Turn of the head for a drag over the whole picture, rad, numerical.
 const TURN_RAD: f32 = 3.0;
 
@@ -69,7 +79,9 @@ pub(crate) struct Check {
     mri: f32,
     bounds: Aabb,
     head: Option<Head>,
-    slices: [(u64, Arc<Image>); 3],
+    slices: [Arc<Image>; 3],
+    /// The images as they were when the case was loaded.
+    images: Source,
     /// The chosen opening, RAS mm.
     pub opening: Option<[f32; 3]>,
     /// The line of the flap on the skull, RAS mm, from the burr hole on; empty without one.
@@ -78,7 +90,6 @@ pub(crate) struct Check {
     drawing: Vec<Vec3>,
     /// Whether the left button draws it.
     pub draws: bool,
-    made: u64,
 }
 
 /// The head in three dimensions.
@@ -86,7 +97,7 @@ struct Head {
     bone: Arc<BoneVolume>,
     painter: Painter,
     camera: Camera,
-    image: (u64, Arc<Image>),
+    image: Arc<Image>,
     centre: Vec3,
     /// Where the skull is opened, and in which direction.
     place: Option<(Vec3, Vec3)>,
@@ -107,8 +118,10 @@ impl Head {
     /// burr hole.
     fn marks(&self, line: &[Vec3]) -> Vec<([f32; 2], String)> {
         let half_mm = 0.5 * self.bone.bounds().size().x;
-        let sides = [("R", half_mm), ("L", -half_mm)].map(|(side, mm)| (side, self.centre + mm * Vec3::X));
         let view = self.view();
+        // A side that is turned away is not marked: its letter would lie on the other one.
+        let sides = [("R", half_mm), ("L", -half_mm)].map(|(side, mm)| (side, self.centre + mm * Vec3::X));
+        let sides = sides.into_iter().filter(|(_, at)| (*at - self.centre).dot(view.forward) < AWAY * half_mm);
         let is_seen = |point: &&Vec3| {
             let first = first_bone(&self.bone, view.eye, (**point - view.eye).normalize());
             first.is_some_and(|bone| bone.distance(**point) < 3.0)
@@ -150,15 +163,28 @@ impl Check {
                 let towards = site.as_ref().map_or(Vec3::Y, eye);
                 let camera = Camera::viewed_from(bounds.centre(), towards, 420.0);
                 let place = site.map(|site| (site.entry, site.inward));
-                Some(Head { bone, painter, camera, image: (0, blank()), centre, place })
+                Some(Head { bone, painter, camera, image: blank(), centre, place })
             }
             None => None,
         };
-        let slices = std::array::from_fn(|_| (0, blank()));
+        let slices = std::array::from_fn(|_| blank());
         let at = head.as_ref().and_then(|head| head.place).map_or(bounds.centre(), |place| place.0);
-        let (line, draws, mri) = (line.iter().copied().map(Vec3::from).collect(), false, 0.5);
-        let mut check =
-            Self { case, name, at, mri, bounds, head, slices, opening, line, drawing: Vec::new(), draws, made: 0 };
+        let mri = if case.brain.is_some() { 0.5 } else { 0.0 };
+        let (line, draws) = (line.iter().copied().map(Vec3::from).collect(), false);
+        let mut check = Self {
+            case,
+            name,
+            at,
+            mri,
+            bounds,
+            head,
+            slices,
+            images: Source::default(),
+            opening,
+            line,
+            drawing: Vec::new(),
+            draws,
+        };
         check.draw_slices();
         check.draw_head()?;
         Ok(check)
@@ -174,6 +200,50 @@ impl Check {
     pub fn slide(&mut self, axis: usize, mm: f32) {
         self.at[axis] = mm;
         self.draw_slices();
+    }
+
+    /// Remembers the images that the case was loaded from.
+    pub fn of_images(self, form: &Form) -> Self {
+        Self { images: form.case.source.clone(), ..self }
+    }
+
+    /// Moves all slices to a place in one of them, a share of its edges.
+    pub fn cross_at(&mut self, plane: usize, [x, y]: [f32; 2]) {
+        let (_, [right, up], _) = PLANES[plane];
+        let (middle, half) = (self.bounds.centre().as_dvec3(), self.half_mm());
+        let normal = right.cross(up).abs();
+        let there = middle + half * ((2.0 * f64::from(x) - 1.0) * right + (1.0 - 2.0 * f64::from(y)) * up);
+        self.at = (there + (self.at.as_dvec3() - there) * normal).as_vec3().clamp(self.bounds.min, self.bounds.max);
+        self.draw_slices();
+    }
+
+    /// Turns pages of a slice, by notches of the wheel.
+    pub fn page_through(&mut self, plane: usize, notches: f32) {
+        let (_, [right, up], _) = PLANES[plane];
+        self.at =
+            (self.at + PAGE_MM * notches * right.cross(up).abs().as_vec3()).clamp(self.bounds.min, self.bounds.max);
+        self.draw_slices();
+    }
+
+    /// Thickness of the bone and depth of the brain along a line into the head, mm.
+    fn layers(&self, outer: Vec3, inward: Vec3) -> (f32, Option<f32>) {
+        let steps = || (0..(DEEPEST_MM / STEP_MM) as usize).map(|n| STEP_MM * n as f32);
+        let bone = self.head.as_ref().map(|head| &head.bone);
+        let is_bone = |mm: f32| bone.is_some_and(|bone| bone.is_bone(bone.voxel_of(outer + mm * inward)));
+        let begin = steps().find(|mm| is_bone(*mm)).unwrap_or(0.0);
+        // Diploe may be hollow: the last bone before a gap of some millimetres counts.
+        let end = steps().filter(|mm| *mm >= begin).try_fold(begin, |last, mm| match is_bone(mm) {
+            true => Ok(mm),
+            false if mm - last < HOLLOW_MM => Ok(last),
+            false => Err(last),
+        });
+        let end = end.unwrap_or_else(|last| last);
+        let brain = self.case.brain.as_ref().map(|brain| Sampled::of(&brain.classes));
+        let is_brain = |mm: f32| {
+            let point = (outer + mm * inward).as_dvec3();
+            brain.as_ref().is_some_and(|classes| classes.at(point).is_some_and(|class| class != 0))
+        };
+        (end - begin + STEP_MM, steps().find(|mm| is_brain(*mm)).map(|mm| mm - begin))
     }
 
     /// Turns the head by a drag.
@@ -244,21 +314,18 @@ impl Check {
     }
 
     fn draw_head(&mut self) -> Result<(), SessionError> {
-        self.made += 1;
         let Some(head) = &mut self.head else { return Ok(()) };
         let markers: Vec<Vec3> = head.place.map(|place| place.0).into_iter().collect();
         let slices = SliceLook { shown: false, ..SliceLook::default() };
         let overlay = Overlay { markers: &markers, ..Overlay::default() };
         let frame = Frame { slices, overlay, ..Frame::of(head.camera) };
         let (image, _) = head.painter.picture(&frame)?;
-        head.image = (self.made, Arc::new(image));
+        head.image = Arc::new(image);
         Ok(())
     }
 
     fn draw_slices(&mut self) {
-        self.made += 1;
-        let images = PLANES.map(|(_, axes, _)| Arc::new(self.slice(axes)));
-        self.slices = images.map(|image| (self.made, image));
+        self.slices = PLANES.map(|(_, axes, _)| Arc::new(self.slice(axes)));
     }
 
     /// Half the edge of a slice, mm.
@@ -302,7 +369,7 @@ impl Check {
     }
 
     /// The page.
-    pub fn page(&self, fault: Option<&str>) -> Page<Action> {
+    pub fn page(&self, fault: Option<&str>, form: &Form) -> Page<Action> {
         let mut head: Vec<Item<Action>> = vec![Item::Heading("Place of the opening".into())];
         if let Some(shown) = &self.head {
             let option = |name: &str, hint: &str| Choosable { name: name.into(), hint: hint.into(), open: true };
@@ -326,34 +393,46 @@ impl Check {
                 letters: shown.marks(if self.line.is_empty() { &self.drawing } else { &self.line }),
                 clicked: (!self.draws).then_some(Action::OpenAt),
                 dragged: Some(Action::Drag),
+                scrolled: None,
             }));
         }
-        let place = match (self.opening, self.case.opening) {
-            (Some(_), _) => "the place that you chose".into(),
-            (None, Some(opening)) => {
+        let measured = self.head.as_ref().and_then(|head| head.place).map(|(at, inward)| self.layers(at, inward));
+        let depth = |brain: Option<f32>| brain.map_or(String::new(), |mm| format!(", brain {mm:.1} mm deep"));
+        let place = match (self.opening, measured, self.case.opening) {
+            (Some(_), Some((bone_mm, brain)), _) => {
+                format!("the place that you chose: bone {bone_mm:.1} mm thick{}", depth(brain))
+            }
+            (_, _, Some(opening)) => {
                 format!("usual place: bone {:.1} mm thick, brain {:.1} mm deep", opening.bone_mm, opening.brain_mm)
             }
-            (None, None) => "no place yet".into(),
+            _ => "no place yet".into(),
         };
         head.push(Item::Text(place));
         if !self.line.is_empty() {
+            let across = across_mm(&self.line.iter().map(Vec3::to_array).collect::<Vec<_>>());
             head.push(Item::Row(vec![
-                Item::Text("Flap: the line that you drew; O is the burr hole".into()),
+                Item::Text(format!("Flap: the line that you drew, {across:.0} mm across; O is the burr hole")),
                 Item::button("Round flap", "forgets this line", Action::RoundFlap),
             ]));
         }
         head.extend(fault.map(|fault| Item::Alert(fault.into())));
         head.push(Item::Heading("Remarks".into()));
-        let notes = self.case.notes.iter().map(|note| Item::Note(printable(note)));
+        let notes = self.case.notes.iter().map(|note| Item::Note(by_controls(&printable(note))));
         head.extend(notes);
+        let images = images(form);
+        if !images.is_empty() {
+            head.push(Item::Heading("Images".into()));
+            head.extend(images);
+        }
+        let next = match self.images == form.case.source {
+            true => Item::main("Start the operation", "with this opening", Action::Begin),
+            false => Item::main("Check the case in pictures", "with what you changed", Action::Check),
+        };
         Page {
             title: format!("Check: {}", printable(&self.name)),
             line: "Right and left, the fit of CT and MRI, the tissue labels, the place of the opening".into(),
             columns: vec![self.slices_part(), head],
-            foot: vec![
-                Item::main("Start the operation", "with this opening", Action::Begin),
-                Item::button("Back to the start page", "the opening is kept", Action::Home),
-            ],
+            foot: vec![next, Item::button("Back to the start page", "the opening is kept", Action::Home)],
             escape: Some(Action::Home),
             steady: true,
         }
@@ -371,7 +450,14 @@ impl Check {
                 letter(self.cross(axes), "+"),
             ];
             let (image, height) = (self.slices[at].clone(), SLICE as f32);
-            Item::Picture(Picture { name: name.into(), image, height, letters, clicked: None, dragged: None })
+            let crosses: [fn([f32; 2]) -> Action; 3] =
+                [|at| Action::Cross(0, at), |at| Action::Cross(1, at), |at| Action::Cross(2, at)];
+            let dragged: [fn(Drag) -> Action; 3] =
+                [|drag| Action::Cross(0, drag.at), |drag| Action::Cross(1, drag.at), |drag| Action::Cross(2, drag.at)];
+            let turns: [fn(f32) -> Action; 3] =
+                [|by| Action::Turn(0, by), |by| Action::Turn(1, by), |by| Action::Turn(2, by)];
+            let (clicked, dragged, scrolled) = (Some(crosses[at]), Some(dragged[at]), Some(turns[at]));
+            Item::Picture(Picture { name: name.into(), image, height, letters, clicked, dragged, scrolled })
         };
         let amount = |name: &str, axis: usize| Amount {
             name: format!("{name}, mm"),
@@ -382,14 +468,15 @@ impl Check {
         let blend = Amount { name: "MRI over CT".into(), value: self.mri, range: [0.0, 1.0], step: 0.05 };
         let mut items = vec![
             Item::Heading("Slices".into()),
-            Item::Note("R right, L left, A front, P back, S up, I down of the patient".into()),
-            Item::Amount(blend, Action::Blend),
-            Item::Row((0..3).map(picture).collect()),
+            Item::Note("A click moves all three there, the wheel turns pages. R right, L left, A front, P back, S up, I down of the patient".into()),
+            Item::Row(vec![picture(0), picture(1)]),
+            Item::Row(vec![picture(2), Item::Gap]),
             Item::Amount(amount("right", 0), |mm| Action::Slide(0, mm)),
             Item::Amount(amount("front", 1), |mm| Action::Slide(1, mm)),
             Item::Amount(amount("up", 2), |mm| Action::Slide(2, mm)),
         ];
         if let Some(brain) = &self.case.brain {
+            items.push(Item::Amount(blend, Action::Blend));
             let found = |class: &TissueClass| brain.classes.data.contains(&class.code());
             let names = TissueClass::ALL.into_iter().filter(found).map(|class| {
                 let colour = COLOURS.get(usize::from(class.code()).wrapping_sub(1)).copied().unwrap_or([255; 3]);
@@ -501,7 +588,7 @@ mod tests {
         let mut check = Check::of(ball(), "c".into(), (None, &[]), Err(GpuError::NoAdapter)).unwrap();
         check.blend(0.0);
         check.slide(2, 0.0);
-        let image = check.slices[0].1.clone();
+        let image = check.slices[0].clone();
         let bright = |from: u32, to: u32| {
             (from..to).filter(|x| image.rgba[((SLICE / 2 * SLICE + x) * 4) as usize] > 128).count()
         };

@@ -1,11 +1,13 @@
 //! What is filled in on the start page, and the options that follow from it.
 
+use crate::desk::browse::Goal;
 use crate::desk::language::Languages;
-use crate::desk::settings::{Recent, Settings, Source, sessions};
+use crate::desk::settings::{Images, Recent, Settings, Source, sessions};
 use crate::error::SessionError;
-use crate::options::Options;
+use crate::options::{Options, Patient};
 use crate::program::{Program, called};
-use std::path::Path;
+use crate::tissue_class::{TissueClass, TissueSource};
+use std::path::{Path, PathBuf};
 use trepan_budget::Quality;
 use trepan_haptics::{Listed, script};
 use trepan_render::window::Choosable;
@@ -23,6 +25,8 @@ pub(crate) struct Form {
     pub languages: Languages,
     /// Devices of this machine.
     pub devices: Vec<Listed>,
+    /// DICOM series of the chosen CT and MRI, in words; empty for files of other kinds.
+    pub series: [Vec<String>; 2],
 }
 
 /// A demonstration by script: its name, what it shows.
@@ -35,7 +39,9 @@ impl Form {
         let settings = Settings::read();
         let usual = Recent { name: built_in.unwrap_or("built-in case").into(), ..Recent::default() };
         let case = settings.recent.first().cloned().unwrap_or(usual);
-        Self { settings, case, languages: Languages::list(), ..Self::default() }
+        let mut form = Self { settings, languages: Languages::list(), ..Self::default() };
+        form.choose(case);
+        form
     }
 
     /// Names of the devices, as `--device` takes them, with what the page shows.
@@ -87,11 +93,57 @@ impl Form {
         Quality::ALL.iter().position(|quality| quality.name() == self.settings.quality).unwrap_or(0)
     }
 
+    /// Chooses a case, and lists the DICOM series of its images.
+    pub fn choose(&mut self, case: Recent) {
+        let list = |path: Option<&PathBuf>| -> Vec<String> {
+            let found = path.and_then(|path| trepan_volume::dicom::series(path).ok()).unwrap_or_default();
+            found.iter().map(ToString::to_string).collect()
+        };
+        self.series = match &case.source {
+            Source::Images(Images { ct, mri, .. }) => [list(ct.as_ref()), list(mri.as_ref())],
+            _ => Default::default(),
+        };
+        self.case = case;
+    }
+
+    /// Adds an image to the chosen case, or takes it away. Another CT is another patient: all that
+    /// belonged to the case before is left behind.
+    pub fn set_image(&mut self, goal: Goal, path: Option<PathBuf>) {
+        let mut case = self.case.clone();
+        let has_ct = matches!(&case.source, Source::Images(Images { ct: Some(_), .. }));
+        if !matches!(case.source, Source::Images(_)) || goal == Goal::Ct && has_ct {
+            let others = self.settings.recent.iter().filter(|recent| recent.name.starts_with("my case")).count();
+            let name = if others == 0 { "my case".into() } else { format!("my case {}", others + 1) };
+            case = Recent { name, source: Source::Images(Images::default()), ..Recent::default() };
+        }
+        let Source::Images(images) = &mut case.source else { return };
+        let (place, series) = match goal {
+            Goal::Ct => (&mut images.ct, Some(0)),
+            Goal::Mri => (&mut images.mri, Some(1)),
+            Goal::Labels => (&mut images.labels, None),
+            Goal::Tumour => (&mut images.tumour, None),
+            Goal::Case | Goal::Recording => return,
+        };
+        *place = path;
+        series.into_iter().for_each(|at| images.series[at] = None);
+        images.register &= images.mri.is_some();
+        (case.hash, case.picture) = (String::new(), None);
+        self.choose(case);
+    }
+
+    /// Changes how the images of the chosen case are imported; the case is built anew.
+    pub fn set(&mut self, change: impl FnOnce(&mut Images)) {
+        if let Source::Images(images) = &mut self.case.source {
+            change(images);
+            self.case.hash.clear();
+        }
+    }
+
     /// Why the session cannot begin yet; `None` if it can.
     pub fn lacks(&self, program: Program) -> Option<&'static str> {
         match &self.case.source {
-            Source::Images { ct: None, .. } if program.has_bone() => Some("open the patient's CT first"),
-            Source::Images { mri: None, .. } if program.has_tissue() => {
+            Source::Images(Images { ct: None, .. }) if program.has_bone() => Some("open the patient's CT first"),
+            Source::Images(Images { mri: None, .. }) if program.has_tissue() => {
                 Some("open an MRI too: this program needs the brain; craniotomy runs without one")
             }
             _ => None,
@@ -103,9 +155,20 @@ impl Form {
         let mut options = base.clone();
         match &self.case.source {
             Source::BuiltIn => {}
-            Source::Images { ct, mri, register } => {
-                (options.patient.ct, options.patient.mri, options.patient.register) =
-                    (ct.clone(), mri.clone(), *register);
+            Source::Images(images) => {
+                let tumour = images.tumour.clone().map(|path| TissueSource::all_of(TissueClass::Tumour, path));
+                let [ct_series, mri_series] = images.series;
+                options.patient = Patient {
+                    ct: images.ct.clone(),
+                    mri: images.mri.clone(),
+                    labels: images.labels.clone(),
+                    tissues: tumour.into_iter().collect(),
+                    register: images.register,
+                    ct_series: ct_series.filter(|_| images.ct.is_some()),
+                    mri_series: mri_series.filter(|_| images.mri.is_some()),
+                    isovalue_hu: images.isovalue_hu,
+                    ..options.patient
+                };
             }
             Source::Folder(folder) => options.case = Some(folder.clone()),
         }
@@ -141,6 +204,27 @@ mod tests {
     use clap::Parser;
 
     #[test]
+    fn one_patient_at_a_time() {
+        let mut form = Form::default();
+        form.set_image(Goal::Ct, Some("a/ct.nii".into()));
+        form.set_image(Goal::Mri, Some("a/t1.nii".into()));
+        form.set_image(Goal::Tumour, Some("a/seg.nii".into()));
+        (form.case.opening, form.case.hash) = (Some([1.0; 3]), "abc".into());
+        form.settings.recent = vec![form.case.clone()];
+        form.set_image(Goal::Ct, Some("b/ct.nii".into()));
+        let only_ct = Images { ct: Some("b/ct.nii".into()), ..Images::default() };
+        let new = Recent { name: "my case 2".into(), source: Source::Images(only_ct), ..Recent::default() };
+        assert_eq!(form.case, new, "nothing of the patient before");
+        form.set_image(Goal::Mri, Some("b/t1.nii".into()));
+        form.set_image(Goal::Mri, None);
+        assert_eq!(form.case, new, "an MRI can be taken away");
+        form.case = Recent::default();
+        form.set_image(Goal::Mri, Some("c/t1.nii".into()));
+        form.set_image(Goal::Ct, Some("c/ct.nii".into()));
+        assert!(matches!(&form.case.source, Source::Images(Images { mri: Some(_), ct: Some(_), .. })), "MRI first");
+    }
+
+    #[test]
     fn the_form_becomes_the_flags_of_a_session() {
         let base = Options::try_parse_from(["x", "--csf-loss", "0.1"]).unwrap();
         let mut form = Form::default();
@@ -149,12 +233,13 @@ mod tests {
         assert_eq!((usual.csf_loss, usual.person), (Some(0.1), None));
         form.settings.device = "script:flap".into();
         (form.settings.flap_mm, form.settings.person) = (30.0, "Ada".into());
-        form.case.source = Source::Images { ct: Some("ct".into()), mri: None, register: true };
+        let images = Images { ct: Some("ct".into()), register: true, isovalue_hu: Some(500), ..Images::default() };
+        form.case.source = Source::Images(images);
         assert!(form.lacks(Program::Integrated).is_some() && form.lacks(Program::Craniotomy).is_none());
         let given = form.options(&base, Program::Integrated).unwrap();
         assert_eq!(
-            (given.device.as_deref(), given.flap, given.patient.register),
-            (Some("script:flap"), Some(30.0), true)
+            (given.device.as_deref(), given.flap, given.patient.register, given.patient.isovalue_hu),
+            (Some("script:flap"), Some(30.0), true, Some(500))
         );
         let (opening, flap_line) = (Some([0.0; 3]), vec![[1.0; 3]; 3]);
         form.case = Recent { source: Source::Folder("c".into()), opening, flap_line, ..Recent::default() };

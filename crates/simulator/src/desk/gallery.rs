@@ -6,7 +6,7 @@ use super::*;
 use crate::desk::action::Action;
 use crate::desk::browse::Goal;
 use crate::desk::job::USUAL_S;
-use crate::desk::settings::{Recent, Source};
+use crate::desk::settings::{Images, Recent, Source};
 use crate::program::Phase;
 use crate::run::lesson::TEACHER_REQUESTS;
 use crate::show::notice_text;
@@ -150,7 +150,7 @@ impl Gallery {
     /// Walks through all pages around a session.
     fn walk(&mut self, look: &mut dyn FnMut(&mut Self, &str)) {
         look(self, "start");
-        let images = |ct: Option<&str>| Source::Images { ct: ct.map(PathBuf::from), mri: None, register: false };
+        let images = |ct: Option<&str>| Source::Images(Images { ct: ct.map(PathBuf::from), ..Images::default() });
         let case = |name: &str, source| Recent { name: name.into(), source, ..Recent::default() };
         self.window.state().with_host(|desk| {
             let form = &mut desk.form;
@@ -207,7 +207,10 @@ impl Gallery {
         self.press("Light or dark", "I");
         self.look("light");
         self.press("Light or dark", "I");
-        self.press("Quit", "Q");
+        self.window.get_by_label(&tr("End the operation")).click_accesskit();
+        self.window.run_steps(3);
+        self.look("end");
+        self.window.get_by_label(&tr("End and write the report (Enter)")).click_accesskit();
         self.waits_for("Back to the start page");
         self.look("result-of-session");
     }

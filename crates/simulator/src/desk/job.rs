@@ -102,16 +102,26 @@ fn expected(settings: &Settings, again: bool, stage: &str) -> f64 {
     settings.seconds.get(&key(again, stage)).copied().unwrap_or(usual.map_or(0.0, |usual| usual.1))
 }
 
-/// Returns the share of loading that is done, and the time left, s.
+/// Share of the time spent in a late stage that is still expected of it, numerical.
+const LATE: f64 = 0.25;
+/// Expected time of the ended stages from which they tell how fast the machine is now, s, numerical.
+const TELLING_S: f64 = 1.0;
+
+/// Returns the share of loading that is done, and the time left, s. Where the stages so far took
+/// longer than expected, the others will too; in a late stage the time left grows.
 fn left(stages: &[Stage], now_ms: f64, expected: impl Fn(&str) -> f64) -> (f32, f64) {
     if stages.last().is_some_and(|last| last.0 == RUNNING) {
         return (1.0, 0.0);
     }
     let at = stages.last().and_then(|last| USUAL_S.iter().position(|(name, _)| *name == last.0));
     let later: f64 = USUAL_S.iter().skip(at.map_or(0, |at| at + 1)).map(|(name, _)| expected(name)).sum();
+    let ended = &stages[..stages.len().saturating_sub(1)];
+    let (was_s, began_s) =
+        (ended.iter().map(|stage| expected(stage.0)).sum::<f64>(), stages.last().map_or(0.0, |s| 1e-3 * s.1));
+    let slower = if was_s > TELLING_S { (began_s / was_s).max(1.0) } else { 1.0 };
     let spent_s = stages.last().map_or(0.0, |last| (now_ms - last.1) * 1e-3);
-    let of_this = at.map_or(0.0, |at| (expected(USUAL_S[at].0) - spent_s).max(0.0));
-    let (done_s, left_s) = (now_ms * 1e-3, later + of_this);
+    let of_this = at.map_or(0.0, |at| (slower * expected(USUAL_S[at].0) - spent_s).max(LATE * spent_s));
+    let (done_s, left_s) = (now_ms * 1e-3, slower * later + of_this);
     ((done_s / (done_s + left_s).max(1e-3)) as f32, left_s)
 }
 
@@ -120,13 +130,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_time_left_falls_and_a_late_stage_does_not_make_it_negative() {
+    fn the_time_left_falls_and_grows_where_a_stage_is_late() {
         let of = |name: &str| if name == "meshing the brain" { 4.0 } else { 1.0 };
-        let stages = [("looking at the images", 0.0), ("meshing the brain", 9000.0)];
-        let (share, left_s) = left(&stages, 10_000.0, of);
+        let stages = [("looking at the images", 0.0), ("meshing the brain", 500.0)];
+        let (share, left_s) = left(&stages, 1500.0, of);
         assert_eq!(left_s, 3.0 + 4.0);
-        assert!((share - 10.0 / 17.0).abs() < 1e-6);
-        assert_eq!(left(&stages, 20_000.0, of).1, 4.0);
+        assert!((share - 1.5 / 8.5).abs() < 1e-6);
+        let [late, later] = [20_500.0, 40_500.0].map(|ms| left(&stages, ms, of).1);
+        assert!((late - 9.0).abs() < 1e-9 && later > late, "{late} {later}");
+        let slow = [("resampling the skull", 0.0), ("planning the opening", 6000.0), ("meshing the brain", 12_000.0)];
+        let six = |name: &str| if name == "meshing the brain" { 4.0 } else { 1.0 };
+        assert_eq!(left(&slow, 12_000.0, six).1, 6.0 * (4.0 + 4.0), "a machine that is six times slower");
         assert_eq!(left(&[("meshing the brain", 0.0), (RUNNING, 1.0)], 5.0, of), (1.0, 0.0));
     }
 

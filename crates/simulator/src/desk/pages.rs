@@ -3,16 +3,18 @@
 use crate::desk::action::Action;
 use crate::desk::browse::{Folder, Goal};
 use crate::desk::form::Form;
-use crate::desk::pictures::Numbered;
-use crate::desk::settings::{Recent, Source};
+use crate::desk::settings::{Images, Recent, Source};
 use crate::error::SessionError;
 use crate::printable::{capital, printable};
 use crate::program::Program;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use trepan_geometry::Vec3;
+use trepan_render::Image;
 use trepan_render::window::{Amount, Choosable, Item, Page, Picture};
 
 /// The first page.
-pub(crate) fn start(program: Program, form: &Form, picture: Option<Numbered>) -> Page<Action> {
+pub(crate) fn start(program: Program, form: &Form, picture: Option<Arc<Image>>) -> Page<Action> {
     let begin = match form.lacks(program) {
         None => Item::main("Start the operation", "loads the case and begins", Action::Begin),
         Some(why) => Item::closed("Start the operation", why),
@@ -43,7 +45,7 @@ fn what(program: Program) -> &'static str {
 /// Largest height of the picture of a case, points.
 const PICTURE: f32 = 190.0;
 
-fn case(form: &Form, picture: Option<Numbered>) -> Vec<Item<Action>> {
+fn case(form: &Form, picture: Option<Arc<Image>>) -> Vec<Item<Action>> {
     let shown = |image| Picture {
         name: "picture of the case".into(),
         image,
@@ -51,6 +53,7 @@ fn case(form: &Form, picture: Option<Numbered>) -> Vec<Item<Action>> {
         letters: Vec::new(),
         clicked: None,
         dragged: None,
+        scrolled: None,
     };
     let mut items = vec![Item::Heading("Case".into())];
     items.extend(picture.map(shown).map(Item::Picture));
@@ -63,7 +66,8 @@ fn case(form: &Form, picture: Option<Numbered>) -> Vec<Item<Action>> {
         ]),
         Item::Note("Or drop files and folders on this window.".into()),
     ]);
-    items.extend(chosen(&form.case));
+    items.extend(images(form));
+    items.extend(opening(&form.case));
     if !form.settings.recent.is_empty() {
         items.push(Item::Heading("Recent cases".into()));
         items.extend(form.settings.recent.iter().enumerate().map(|(at, recent)| self::recent(at, recent)));
@@ -71,24 +75,58 @@ fn case(form: &Form, picture: Option<Numbered>) -> Vec<Item<Action>> {
     items
 }
 
-/// The chosen case: its name, its images and its opening.
-fn chosen(case: &Recent) -> Vec<Item<Action>> {
-    let mut items = Vec::new();
-    if let Source::Images { ct, mri, register } = &case.source {
-        let name = "a name that you know it by; not the patient's";
-        items.push(Item::Field("Name".into(), case.name.clone(), name.into(), Action::Name));
-        for (kind, path) in [("CT", ct), ("MRI", mri)] {
-            items.push(Item::Text(format!("{kind}: {}", path.as_deref().map_or("none yet".into(), described))));
-        }
-        if ct.is_some() && mri.is_some() {
-            let option = |name: &str, hint: &str| Choosable { name: name.into(), hint: hint.into(), open: true };
-            let options = vec![
-                option("as scanned", "both are in one space already"),
-                option("register", "moves the MRI to the CT by mutual information; takes a minute more"),
-            ];
-            items.push(Item::Choice("MRI to CT".into(), options, usize::from(*register), Action::Register));
-        }
+/// Largest threshold of bone that the page offers, HU, numerical.
+const MOST_HU: f32 = 1500.0;
+
+/// The chosen case: its name, its images, and how they are imported.
+pub(crate) fn images(form: &Form) -> Vec<Item<Action>> {
+    let Source::Images(images) = &form.case.source else { return Vec::new() };
+    let name = "a name that you know it by; not the patient's";
+    let mut items = vec![Item::Field("Name".into(), form.case.name.clone(), name.into(), Action::Name)];
+    let files = [
+        (Goal::Ct, "CT", &images.ct),
+        (Goal::Mri, "MRI", &images.mri),
+        (Goal::Labels, "Brain labels", &images.labels),
+        (Goal::Tumour, "Tumour labels", &images.tumour),
+    ];
+    for (goal, kind, path) in files {
+        let closed = !matches!(goal, Goal::Ct | Goal::Mri) && images.mri.is_none();
+        items.extend(match path {
+            Some(path) => Some(Item::Row(vec![
+                Item::Text(format!("{kind}: {}", described(path))),
+                Item::button("x", "takes it away from this case; the file stays", Action::Remove(goal)),
+            ])),
+            None if closed => None,
+            None if matches!(goal, Goal::Ct | Goal::Mri) => Some(Item::Text(format!("{kind}: none yet"))),
+            None => Some(Item::Row(vec![Item::button(format!("{kind}..."), goal.line(), Action::Browse(goal))])),
+        });
     }
+    let option = |name: String, hint: &str| Choosable { name, hint: hint.into(), open: true };
+    for (at, name) in ["CT series", "MRI series"].into_iter().enumerate().filter(|(at, _)| form.series[*at].len() > 1) {
+        let usual = option("usual".into(), "the one with the most slices of this kind");
+        let found = form.series[at].iter().enumerate().map(|(number, words)| option(number.to_string(), words));
+        let chosen = images.series[at].map_or(0, |number| number + 1);
+        let does = [Action::CtSeries, Action::MriSeries][at];
+        items.push(Item::Choice(name.into(), [usual].into_iter().chain(found).collect(), chosen, does));
+    }
+    if images.ct.is_some() {
+        let (value, range) = (images.isovalue_hu.map_or(0.0, f32::from), [0.0, MOST_HU]);
+        let name = if value > 0.0 { "HU: threshold of bone" } else { "threshold of bone: from the histogram" };
+        items.push(Item::Amount(Amount { name: name.into(), value, range, step: 25.0 }, Action::Isovalue));
+    }
+    if images.ct.is_some() && images.mri.is_some() {
+        let options = vec![
+            option("as scanned".into(), "both are in one space already"),
+            option("register".into(), "moves the MRI to the CT by mutual information; takes a minute more"),
+        ];
+        items.push(Item::Choice("MRI to CT".into(), options, usize::from(images.register), Action::Register));
+    }
+    items
+}
+
+/// The chosen place of the opening and the drawn flap.
+fn opening(case: &Recent) -> Vec<Item<Action>> {
+    let mut items = Vec::new();
     if let Some([x, y, z]) = case.opening {
         items.push(Item::Row(vec![
             Item::Text(format!("Opening at {x:.0}, {y:.0}, {z:.0} mm (right, front, up)")),
@@ -97,20 +135,27 @@ fn chosen(case: &Recent) -> Vec<Item<Action>> {
     }
     if !case.flap_line.is_empty() {
         items.push(Item::Row(vec![
-            Item::Text("Flap along the line that you drew".into()),
+            Item::Text(format!("Flap along the line that you drew, {:.0} mm across", across_mm(&case.flap_line))),
             Item::button("Round flap", "forgets this line", Action::RoundFlap),
         ]));
     }
     items
 }
 
-/// Describes a file or folder without its name, which may be a patient's.
+/// Largest distance of two points of a line, mm.
+pub(crate) fn across_mm(line: &[[f32; 3]]) -> f32 {
+    let points = || line.iter().map(|point| Vec3::from(*point));
+    points().flat_map(|a| points().map(move |b| a.distance(b))).fold(0.0, f32::max)
+}
+
+/// Describes a file or folder by its own name; folders above it may name a patient.
 fn described(path: &Path) -> String {
+    let name = printable(&path.file_name().unwrap_or_default().to_string_lossy());
     match std::fs::read_dir(path) {
-        Ok(entries) => format!("a folder of {} entries", entries.count()),
+        Ok(entries) => format!("{name}, a folder of {} entries", entries.count()),
         Err(_) => match path.metadata() {
-            Ok(file) => format!("a file of {:.1} MB", file.len() as f64 * 1e-6),
-            Err(_) => "it is not there any more".into(),
+            Ok(file) => format!("{name}, {:.1} MB", file.len() as f64 * 1e-6),
+            Err(_) => format!("{name}: it is not there any more"),
         },
     }
 }
@@ -118,9 +163,9 @@ fn described(path: &Path) -> String {
 fn recent(at: usize, recent: &Recent) -> Item<Action> {
     let kind = match &recent.source {
         Source::BuiltIn => "built-in case".into(),
-        Source::Images { ct, mri, .. } => {
-            let parts = [("CT", ct.is_some()), ("MRI", mri.is_some())];
-            parts.into_iter().filter(|part| part.1).map(|part| part.0).collect::<Vec<_>>().join(" and ")
+        Source::Images(Images { ct, mri, .. }) => {
+            let name = |path: &PathBuf| printable(&path.file_name().unwrap_or_default().to_string_lossy());
+            [ct, mri].into_iter().flatten().map(name).collect::<Vec<_>>().join(", ")
         }
         Source::Folder(_) => "case folder".to_string(),
     };
@@ -149,7 +194,7 @@ fn session(program: Program, form: &Form) -> Vec<Item<Action>> {
         Item::Choice("First tool".into(), Form::tools(program), settings.tool, Action::Tool),
         Item::Choice("Quality".into(), Form::qualities(), form.quality(), Action::Quality),
     ];
-    if program.has_bone() {
+    if program.has_bone() && form.case.flap_line.is_empty() {
         let name = if settings.flap_mm > 0.0 { "mm across: a flap" } else { "mm across: a burr hole, no flap" };
         items.push(Item::Note("Planned flap".into()));
         let amount = Amount { name: name.into(), value: settings.flap_mm, range: [0.0, 90.0], step: 2.0 };
@@ -173,6 +218,7 @@ fn more(program: Program, form: &Form) -> Vec<Item<Action>> {
         Item::button("Replay a recording...", Goal::Recording.line(), Action::Browse(Goal::Recording)),
         Item::Heading("Window".into()),
         Item::Choice("Language".into(), form.languages.choosable(), language, Action::Language),
+        Item::Look,
         Item::Note("F1 in a session lists all keys. Q ends it and writes its report.".into()),
         Item::Row(vec![Item::button("Quit", "closes the window", Action::Close)]),
     ]
@@ -250,18 +296,44 @@ pub(crate) fn writing() -> Page<Action> {
     Page { title: "Writing the report".into(), line: "pictures, scores, drilled skull".into(), ..Page::default() }
 }
 
+/// Flags, and the controls of the window that do the same.
+const CONTROLS: [(&str, &str); 12] = [
+    ("--tissue CLASS=PATH", "\"Tumour labels...\""),
+    ("--tissue tumour", "\"Tumour labels\""),
+    ("--labels PATH", "\"Brain labels...\""),
+    ("--labels", "\"Brain labels\""),
+    ("--isovalue-hu", "\"threshold of bone\""),
+    ("--ct-series", "\"CT series\""),
+    ("--mri-series", "\"MRI series\""),
+    ("--register", "\"register\""),
+    ("--opening", "the place of the opening"),
+    ("--flap", "\"Planned flap\""),
+    ("--ct", "\"Open CT...\""),
+    ("--mri", "\"Open MRI...\""),
+];
+
+/// Names the window's controls instead of the flags in a message.
+pub(crate) fn by_controls(text: &str) -> String {
+    CONTROLS.iter().fold(text.to_string(), |text, (flag, control)| text.replace(flag, control))
+}
+
 /// The page of an error: what is wrong and what to do. Paths of the images are left out, since they
 /// may name a patient.
 pub(crate) fn fault(fault: &SessionError, source: &Source) -> Page<Action> {
     let images = match source {
-        Source::Images { ct, mri, .. } => [(ct.as_deref(), "the CT"), (mri.as_deref(), "the MRI")],
-        _ => [(None, ""); 2],
+        Source::Images(images) => [
+            (images.ct.as_deref(), "the CT"),
+            (images.mri.as_deref(), "the MRI"),
+            (images.labels.as_deref(), "the labels of the brain"),
+            (images.tumour.as_deref(), "the labels of the tumour"),
+        ],
+        _ => [(None, ""); 4],
     };
     let without = |text: String, (path, name): (Option<&Path>, &str)| match path {
         Some(path) => text.replace(&path.display().to_string(), name),
         None => text,
     };
-    let text = printable(&images.into_iter().fold(fault.to_string(), without));
+    let text = by_controls(&printable(&images.into_iter().fold(fault.to_string(), without)));
     let (problem, remedy) = split(&text);
     let usual = match fault {
         SessionError::Internal(_) | SessionError::Picture(_) => {
@@ -306,8 +378,15 @@ mod tests {
     }
 
     #[test]
+    fn an_error_names_the_control_and_not_the_flag() {
+        let text = "the MRI does not lie in the CT's space: give --register, --labels PATH or --isovalue-hu 700";
+        let said = by_controls(text);
+        assert!(!said.contains("--") && said.contains("\"register\", \"Brain labels...\""), "{said}");
+    }
+
+    #[test]
     fn no_path_of_an_image_is_shown() {
-        let images = Source::Images { ct: Some("/data/Doe^Jane/ct".into()), mri: None, register: false };
+        let images = Source::Images(Images { ct: Some("/data/Doe^Jane/ct".into()), ..Images::default() });
         let mut form =
             Form { case: Recent { name: "case".into(), source: images, ..Recent::default() }, ..Form::default() };
         form.settings.recent = vec![form.case.clone()];

@@ -74,6 +74,26 @@ pub(crate) struct Recent {
     pub flap_line: Vec<[f32; 3]>,
 }
 
+/// A patient's images, and how they are imported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Images {
+    /// CT, if any.
+    pub ct: Option<PathBuf>,
+    /// MRI, if any.
+    pub mri: Option<PathBuf>,
+    /// Label volume of the brain, if any.
+    pub labels: Option<PathBuf>,
+    /// Label volume of a tumour, if any.
+    pub tumour: Option<PathBuf>,
+    /// Whether the MRI is registered to the CT.
+    pub register: bool,
+    /// DICOM series of CT and MRI, by number; `None` takes the usual one.
+    pub series: [Option<usize>; 2],
+    /// Threshold of bone, HU; `None` takes it from the histogram.
+    pub isovalue_hu: Option<i16>,
+}
+
 /// Where a case comes from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Source {
@@ -81,14 +101,7 @@ pub(crate) enum Source {
     #[default]
     BuiltIn,
     /// The scanner's images.
-    Images {
-        /// CT, if any.
-        ct: Option<PathBuf>,
-        /// MRI, if any.
-        mri: Option<PathBuf>,
-        /// Whether the MRI is registered to the CT.
-        register: bool,
-    },
+    Images(Images),
     /// A folder that `case build` made.
     Folder(PathBuf),
 }

@@ -186,7 +186,8 @@ impl Desk {
     /// Shows a case in pictures.
     fn look_at(&mut self, case: Case) {
         let Recent { name, opening, flap_line, .. } = self.form.case.clone();
-        match Check::of(case, name, (opening, &flap_line), self.device.clone()) {
+        match Check::of(case, name, (opening, &flap_line), self.device.clone()).map(|check| check.of_images(&self.form))
+        {
             Ok(check) => self.view = View::Check(Box::new(check), None),
             Err(fault) => self.fail(fault),
         }
@@ -245,21 +246,13 @@ impl Desk {
     fn take_path(&mut self, goal: Goal, path: PathBuf) {
         self.form.settings.folder = path.parent().map(PathBuf::from);
         self.view = View::Start;
-        let case = &mut self.form.case;
         match goal {
             Goal::Recording => self.begin(self.form.replay(&self.base, self.program, &path)),
             Goal::Case => {
-                *case = Recent { name: "case folder".into(), source: Source::Folder(path), ..Recent::default() };
+                let source = Source::Folder(path);
+                self.form.choose(Recent { name: "case folder".into(), source, ..Recent::default() });
             }
-            Goal::Ct | Goal::Mri => {
-                if !matches!(case.source, Source::Images { .. }) {
-                    let source = Source::Images { ct: None, mri: None, register: false };
-                    *case = Recent { name: "my case".into(), source, ..Recent::default() };
-                }
-                let Source::Images { ct, mri, .. } = &mut case.source else { return };
-                *(if goal == Goal::Ct { ct } else { mri }) = Some(path);
-                case.hash.clear();
-            }
+            Goal::Ct | Goal::Mri | Goal::Labels | Goal::Tumour => self.form.set_image(goal, Some(path)),
         }
     }
 
@@ -269,7 +262,7 @@ impl Desk {
         let is =
             |case: &&Recent| name.as_ref().is_some_and(|name| case.hash.get(..8).is_some_and(|h| name.ends_with(h)));
         let built_in = || Recent { name: self.built_in.name.unwrap_or_default().into(), ..Recent::default() };
-        self.form.case = self.form.settings.recent.iter().find(is).cloned().unwrap_or_else(built_in);
+        self.form.choose(self.form.settings.recent.iter().find(is).cloned().unwrap_or_else(built_in));
         self.begin(self.form.replay(&self.base, self.program, recording));
     }
 }
@@ -307,7 +300,7 @@ impl Host for Desk {
             }
             View::Browse(goal, folder, written) => Shown::Page(Box::new(pages::browse(*goal, folder, written))),
             View::Page(page) => Shown::Page(page.clone()),
-            View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault))),
+            View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault, &self.form))),
             View::Session(job, name) => match (job.is_running(), guest) {
                 (true, true) => Shown::Session(None),
                 (true, false) => Shown::Page(Box::new(pages::writing())),
@@ -326,17 +319,17 @@ impl Host for Desk {
             Action::BuiltIn => {
                 let usual = Recent { name: self.built_in.name.unwrap_or_default().into(), ..Recent::default() };
                 let known = form.settings.recent.iter().find(|recent| recent.source == Source::BuiltIn).cloned();
-                form.case = known.unwrap_or(usual);
+                form.choose(known.unwrap_or(usual));
             }
-            Action::Recent(at) => form.case = form.settings.recent.get(at).cloned().unwrap_or_default(),
+            Action::Recent(at) => form.choose(form.settings.recent.get(at).cloned().unwrap_or_default()),
+            Action::Remove(goal) => form.set_image(goal, None),
             Action::Forget(at) if at < form.settings.recent.len() => _ = form.settings.recent.remove(at),
             Action::Forget(_) => {}
             Action::Name(name) => form.case.name = name,
-            Action::Register(at) => {
-                if let Source::Images { register, .. } = &mut form.case.source {
-                    *register = at == 1;
-                }
-            }
+            Action::Register(at) => form.set(|images| images.register = at == 1),
+            Action::CtSeries(at) => form.set(|images| images.series[0] = at.checked_sub(1)),
+            Action::MriSeries(at) => form.set(|images| images.series[1] = at.checked_sub(1)),
+            Action::Isovalue(hu) => form.set(|images| images.isovalue_hu = (hu > 0.0).then_some(hu as i16)),
             Action::UsualOpening => {
                 (form.case.opening, form.case.flap_line) = (None, Vec::new());
                 form.case.hash.clear();
@@ -411,6 +404,14 @@ impl Desk {
                 check.slide(axis, mm);
                 Ok(())
             }
+            Action::Cross(plane, at) => {
+                check.cross_at(plane, at);
+                Ok(())
+            }
+            Action::Turn(plane, notches) => {
+                check.page_through(plane, notches);
+                Ok(())
+            }
             _ => Ok(()),
         };
         self.form.case.flap_line = check.line.iter().map(|point| point.to_array()).collect();
@@ -467,7 +468,7 @@ impl Desk {
             }
             Action::Check => self.check(),
             Action::OpenAt(_) | Action::Drag(_) | Action::Draw(_) | Action::RoundFlap => self.look(action),
-            Action::Blend(_) | Action::Slide(..) => self.look(action),
+            Action::Blend(_) | Action::Slide(..) | Action::Cross(..) | Action::Turn(..) => self.look(action),
             Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept(), &lessons()))),
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))

@@ -33,7 +33,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         mm if mm.is_finite() => format!("{mm:.1} mm"),
         _ => "no brain here".into(),
     };
-    let task = [value("tool to brain", brain_mm), value("bone removed", format!("{:.0} mm³", view.removed_mm3))];
+    let removed = program.has_bone().then(|| value("bone removed", format!("{:.0} mm³", view.removed_mm3)));
+    let task = [value("tool to brain", brain_mm)].into_iter().chain(removed).collect();
     let values = [
         value("force of the task", format!("{:.1} N", view.task_n)),
         value("scale", view.force_scale.text()),
@@ -62,7 +63,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         force_limit_n: view.force_limit_n,
         choices: vec![tray(program, view)],
         values: values.into_iter().chain(band).chain(second).collect(),
-        task: task.into(),
+        task,
+        no_bone: !program.has_bone(),
         no_drill: (!sample.tool.kind.cuts())
             .then(|| format!("the {} does not drill: take a tool for bone with its number key", called(&sample.tool))),
         warnings: urgent(view.warnings).map(|warning| warning.text().into()).collect(),
