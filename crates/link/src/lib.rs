@@ -24,7 +24,9 @@ pub mod wire;
 
 pub use error::LinkError;
 pub use recorder::{MAX_CHUNK_BYTES, MAX_CHUNK_MS, Recorder};
-pub use recording::{Damage, Recording, Repaired, repair};
+pub use recording::{
+    Damage, NODE_STEP_MM, Recording, Repaired, SceneChange, SceneRecord, SceneWriter, read_scene, repair,
+};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

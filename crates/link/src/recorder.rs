@@ -222,7 +222,7 @@ fn foxglove_channel<T: Encode, W: Write + Seek>(mcap: &mut mcap::Writer<W>, topi
     mcap.add_channel(schema, topic, &T::get_message_encoding(), &BTreeMap::new())
 }
 
-fn metadata(header: &SessionHeader) -> Metadata {
+pub(crate) fn metadata(header: &SessionHeader) -> Metadata {
     // Serialising a struct of strings and maps of strings cannot fail.
     let json = serde_json::to_string(header).unwrap_or_default();
     let entries = [(FORMAT_KEY.to_owned(), FORMAT.to_string()), (HEADER_KEY.to_owned(), json)];

@@ -12,9 +12,11 @@ mod chunk;
 mod losses;
 mod repair;
 mod scan;
+mod scene;
 
 pub use losses::Damage;
 pub use repair::{Repaired, repair};
+pub use scene::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter, read_scene};
 
 use crate::LinkError;
 use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME, LOSSES_KEY, REPAIR_NAME};
