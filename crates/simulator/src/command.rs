@@ -70,7 +70,7 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     }
     if !options.headless && display().is_ok() {
         return match desk::run(program, options, built_in) {
-            None | Some(Ok(Done::Case(_))) => ExitCode::SUCCESS,
+            None | Some(Ok(Done::Case(_) | Done::Viewed)) => ExitCode::SUCCESS,
             Some(Ok(Done::Session(ended))) => report(&ended),
             Some(Ok(Done::Batch(counts))) => replayed(counts),
             Some(Err(fault)) => failed(program, &fault),

@@ -19,13 +19,13 @@ use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{CutOff, Machine, SecondSummary, SolverSummary, Summary, fps};
 use crate::report::{drilled, output};
-use crate::run::film::Filming;
+use crate::run::film::{self, Filming};
 use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::{Asked, Company, Share};
-use crate::run::{Outcome, RenderInputs, Run, Stages};
+use crate::run::{Outcome, RenderInputs, Run, Stages, View};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
 use crate::show::graphics::{Graphics, NoPicture};
@@ -34,12 +34,14 @@ use crate::show::{player, window};
 use crate::stages::haptic_tick::ToolSample;
 use crate::training::{Guide, Lesson};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Script;
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse, spacemouse};
 use trepan_link::wire::SessionHeader;
-use trepan_link::{Recorder, Recording};
+use trepan_link::{Recorder, Recording, SceneWriter};
 use trepan_render::Camera;
 use trepan_render::window::Stage;
 use trepan_volume::{BoneVolume, VoxelVolume};
@@ -50,7 +52,7 @@ pub struct Session {
     options: Options,
     device: DeviceName,
     second: Option<DeviceName>,
-    recording: Option<Recording>,
+    recording: Option<Arc<Recording>>,
     case: Identity,
     setup: SessionSetup,
     /// Input files of the case; empty for a case folder.
@@ -109,11 +111,11 @@ impl Session {
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
         let recording = match device.recording() {
-            Some(path) => Some(recordings::open(program, path, &choice::identity(&options, &built_in)?)?),
+            Some(path) => Some(Arc::new(recordings::open(program, path, &choice::identity(&options, &built_in)?)?)),
             None => None,
         };
-        let operation = Operation::of(&options, &device, recording.as_ref());
-        let request = ModelRequest::of(program, &options, &operation, recording.as_ref())?;
+        let operation = Operation::of(&options, &device, recording.as_deref());
+        let request = ModelRequest::of(program, &options, &operation, recording.as_deref())?;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
             None => choice::inputs(&options.patient, built_in.clone()),
@@ -129,6 +131,38 @@ impl Session {
             .clone()
             .unwrap_or_else(|| output::dated(program, options.sessions.as_deref(), options.name.as_deref()));
         Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, lesson, place })
+    }
+
+    /// Whether the session only shows a recording in the window: then it writes nothing.
+    pub(crate) fn is_viewed(&self) -> bool {
+        self.windowed() && self.recording.is_some() && self.options.out.is_none() && self.options.record.is_none()
+    }
+
+    /// Shows a recording in the window: its film, or without one a replay that is made meanwhile.
+    pub(crate) fn view(mut self) -> Result<(), SessionError> {
+        let (Some(recording), Some(path)) = (self.recording.clone(), self.device.recording()) else { return Ok(()) };
+        let scene = trepan_link::read_scene(&output::scene_of(path), &recording.header).ok().flatten();
+        let Some(scene) = scene.filter(|scene| !scene.is_empty()) else {
+            tracing::info!("no film of this session lies beside its recording: skull and brain are computed again");
+            let scratch = tempfile::tempdir().map_err(SessionError::output(&std::env::temp_dir()))?;
+            self.out = scratch.path().join("replay");
+            return self.run().map(|_| ());
+        };
+        let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
+        let limits = DeviceLimits::recorded(Some(&recording), hand::FIRST);
+        let mut first = View::at(self.start(), limits.guard().max_force_n);
+        first.force_scale = limits.force_scale();
+        self.place.progress.next("preparing the picture")?;
+        let drawing = self.place.drawing.take();
+        let mut graphics = self.graphics(drawing);
+        let painter = graphics.as_mut().map_err(|why| SessionError::Internal(why.to_string()))?.painter.take();
+        let Some((painter, stage)) = painter.zip(self.place.window.as_ref()) else { return Ok(()) };
+        let (sender, coming) = channel();
+        scene.into_iter().for_each(|record| _ = sender.send(film::Shot::of(record, first)));
+        drop(sender);
+        let until_s = self.options.duration.unwrap_or(f64::INFINITY);
+        player::show(first, coming, painter, &self.opened(stage), &recording, until_s, &stop);
+        Ok(())
     }
 
     /// Runs the session and writes its files; on failure no partly written file remains.
@@ -154,14 +188,19 @@ impl Session {
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let recorder = Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?;
+        let header = self.header(&limits, second_limits.as_ref());
+        let recorder = Recorder::create(&record, &header)?;
+        let scene = match self.recording {
+            None => Some((self.film(None), SceneWriter::create(&output::scene_of(&record), &header)?)),
+            Some(_) => None,
+        };
         self.place.progress.next("preparing the picture")?;
         let drawing = self.place.drawing.take();
         let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
         let devices = device.map(|first| Devices { first, second: second_device });
-        let run = Run { stages, start, recorder, share, stop: &stop };
+        let run = Run { stages, start, recorder, share, scene, stop: &stop };
         let outcome = self.loops(run, devices, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
@@ -291,7 +330,7 @@ impl Session {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
-                let film = self.windowed().then(|| Filming::new(self.setup.bone().cloned(), length_ms));
+                let film = self.windowed().then(|| self.film(Some(length_ms)));
                 lockstep::run(run, (recording, end_ms), film, picture)
             }
             (None, Some(devices)) => threads::run(run, devices, self.pace(), picture),
@@ -299,10 +338,16 @@ impl Session {
         }
     }
 
+    /// The film of the session's skull and brain.
+    fn film(&self, length_ms: Option<f64>) -> Filming {
+        let rest = self.setup.scene.brain.as_ref().map(|brain| brain.mesh.positions.clone()).unwrap_or_default();
+        Filming::new(self.setup.bone().cloned(), rest, length_ms)
+    }
+
     /// Limits of a hand's device; the recorded ones, if none is open.
     fn limits(&self, hand: &OpenDevice, name: &str) -> DeviceLimits {
         let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
-        let recorded = || DeviceLimits::recorded(self.recording.as_ref(), name);
+        let recorded = || DeviceLimits::recorded(self.recording.as_deref(), name);
         let of = |device: &dyn HapticDevice| DeviceLimits::of(&device.capabilities(), scale, self.options.force_scale);
         hand.device.as_deref().map_or_else(recorded, of)
     }
@@ -339,26 +384,29 @@ impl Session {
             let folder = self.out.join("frames");
             return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
         };
-        let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
-        let progress = &self.place.progress;
-        let is_knob = |device: &DeviceName| device.kind().name == spacemouse::DEVICE.name;
-        let opened = window::Opened {
-            progress,
-            stage,
-            table,
-            case,
-            out,
-            rate_hz,
-            slot: self.options.first_slot,
-            guide: self.lesson.clone().map(Guide::new),
-            knob: ![Some(&self.device), self.second.as_ref()].into_iter().flatten().any(is_knob),
-        };
+        let opened = self.opened(stage);
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
                 let until_s = self.options.duration.unwrap_or(f64::INFINITY);
                 player::show(*eyes.view.latest().0, film, painter, &opened, recording, until_s, stop)
             }
             _ => window::show(eyes, painter, &opened, pointer, company, stop),
+        }
+    }
+
+    /// What the window needs of the session.
+    fn opened<'a>(&'a self, stage: &'a Stage) -> window::Opened<'a> {
+        let is_knob = |device: &DeviceName| device.kind().name == spacemouse::DEVICE.name;
+        window::Opened {
+            progress: &self.place.progress,
+            stage,
+            table: &self.setup,
+            case: &self.case.name,
+            out: &self.out,
+            rate_hz: self.setup.operation.rate_hz,
+            slot: self.options.first_slot,
+            guide: self.lesson.clone().map(Guide::new),
+            knob: ![Some(&self.device), self.second.as_ref()].into_iter().flatten().any(is_knob),
         }
     }
 

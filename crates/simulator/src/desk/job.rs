@@ -11,6 +11,8 @@ use std::thread::JoinHandle;
 pub(crate) enum Done {
     /// A session.
     Session(Box<Ended>),
+    /// A recording that was looked at.
+    Viewed,
     /// A case that is to be looked at.
     Case(Box<Case>),
     /// A batch of replays: how many failed, how many there were.

@@ -61,6 +61,8 @@ pub(crate) struct Desk {
     /// Whether the program was started for one session.
     direct: bool,
     pub(super) last: Option<Result<Done, SessionError>>,
+    /// Folder of the session whose replay is shown, from its result.
+    viewed: Option<PathBuf>,
     /// Dropped files and folders that still need a purpose.
     waiting: Vec<PathBuf>,
     devices: Receiver<Vec<Listed>>,
@@ -94,6 +96,7 @@ impl Desk {
             device,
             direct,
             last,
+            viewed: None,
             waiting: Vec::new(),
             devices,
             stop,
@@ -170,6 +173,10 @@ impl Desk {
             Err(SessionError::Cancelled) => View::Start,
             Err(fault) => View::Page(Box::new(pages::fault(fault, &self.form.case.source))),
             Ok(_) if self.direct => View::Closed,
+            Ok(Done::Viewed) => match self.viewed.take() {
+                Some(folder) => View::Page(Box::new(results::page(&folder, &self.kept(), &lessons()))),
+                None => View::Start,
+            },
             Ok(Done::Batch(_) | Done::Case(_)) => View::Start,
             Ok(Done::Session(ended)) => {
                 self.form.case.hash = ended.case.clone().unwrap_or_default();
@@ -247,7 +254,10 @@ impl Desk {
         self.form.settings.folder = path.parent().map(PathBuf::from);
         self.view = View::Start;
         match goal {
-            Goal::Recording => self.begin(self.form.replay(&self.base, self.program, &path)),
+            Goal::Recording => {
+                self.viewed = None;
+                self.begin(self.form.replay(&self.base, self.program, &path));
+            }
             Goal::Case => {
                 let source = Source::Folder(path);
                 self.form.choose(Recent { name: "case folder".into(), source, ..Recent::default() });
@@ -274,8 +284,11 @@ fn lessons() -> Vec<Lesson> {
 /// The work of one session.
 fn session(program: Program, options: Options, built_in: Inputs) -> Work {
     Box::new(move |place| {
-        let ended = Session::open_in(program, options, built_in, place)?.run()?;
-        Ok(Done::Session(Box::new(ended)))
+        let session = Session::open_in(program, options, built_in, place)?;
+        if session.is_viewed() {
+            return session.view().map(|()| Done::Viewed);
+        }
+        Ok(Done::Session(Box::new(session.run()?)))
     })
 }
 
@@ -474,7 +487,10 @@ impl Desk {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
             }
             Action::Report(folder) => open(&folder.join("report.html")),
-            Action::Replay(folder) => self.replay(&folder.join("session.mcap")),
+            Action::Replay(folder) => {
+                self.viewed = Some(folder.clone());
+                self.replay(&folder.join("session.mcap"));
+            }
             Action::Close => self.view = View::Closed,
             _ => {}
         }

@@ -30,6 +30,11 @@ const NAMES: [&str; 8] = [
 ];
 /// Default name of the recording; `--record` gives another.
 pub(crate) const RECORDING: &str = "session.mcap";
+/// The film of a recording's session, beside it.
+pub(crate) fn scene_of(record: &Path) -> PathBuf {
+    record.with_extension("scene.mcap")
+}
+
 /// Largest number of letters of a session's name in the name of its folder.
 const MOST_LETTERS: usize = 60;
 /// Folder of the pictures.
@@ -103,7 +108,7 @@ impl Files {
         let frames = self.out.join(FRAMES);
         let pictures = fs::read_dir(&frames).into_iter().flatten().flatten();
         let pictures = pictures.map(|entry| entry.path()).filter(|path| path.extension() == Some(OsStr::new("png")));
-        let files = NAMES.iter().map(|name| self.out.join(name)).chain([self.record.clone()]);
+        let files = NAMES.iter().map(|name| self.out.join(name)).chain([self.record.clone(), scene_of(&self.record)]);
         for path in files.filter(|path| path.exists()).chain(pictures) {
             fs::remove_file(&path).map_err(SessionError::output(&path))?;
         }

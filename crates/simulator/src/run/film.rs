@@ -1,5 +1,5 @@
-//! Film of a replay: made once at full speed on the replay's thread, played forwards and backwards
-//! by the window.
+//! Film of a session: taken while it runs, or made again by a replay at full speed; played forwards
+//! and backwards by the window.
 //!
 //! # Theory
 //! Stages run forwards only, but their changes can be undone. A [`Shot`] is taken thirty times per
@@ -9,32 +9,37 @@
 //! writes the new values, backwards the old ones, so that the skull is exact at every shot.
 //!
 //! ```text
-//!  stages ── carve a copy of the skull ───┐
-//!      every 1/30 s: view, brain, changes └──> channel ──> window: writes into the visible skull
+//!  live      loops carve the skull ──┐ thread of the film ──> scene file beside the recording
+//!  replay    a copy is carved again ─┤ thread of the replay ──> channel ──> window
+//!  seek      scene file, or channel ──> window: writes changes into the visible skull
 //! ```
 //!
 //! # Practice
-//! The stages run on a copy of the skull, so memory holds three skulls (the visible one, the copy
-//! and the state at the last shot, each with its cut) and the nodes of at most [`BRAINS`] shots, 12
-//! bytes each. A minute of craniotomy is made in a second; with the brain, in about the time of the
-//! solver.
-//!
-//! # When not to use it
-//! Headless: there is no time bar.
+//! A live session's film is taken by a thread of its own, some 0.1 ms a shot, and is at most a tick
+//! or two ahead of the tick that it names. Memory holds the skull at the last shot and the nodes of
+//! some shots, 6 bytes each. Without a scene file a minute of craniotomy is made again in a second;
+//! with the brain, in about the time of the solver.
 
 use crate::run::View;
+use crate::run::stop::Stop;
 use crate::stages::notice::Notice;
 use glam::IVec3;
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 use trepan_geometry::Vec3;
+use trepan_link::cell::Reader;
+use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
 use trepan_volume::BoneVolume;
 
 /// Session time between two shots, ms.
 pub(crate) const SHOT_MS: f64 = 1000.0 / 30.0;
-/// Largest number of shots that hold the brain's node positions.
+/// Largest number of shots that hold the brain's nodes, where the length is known.
 const BRAINS: f64 = 3600.0;
+/// Session time between two shots of a live session that hold the brain's nodes, ms.
+const BRAIN_MS: f64 = 100.0;
+/// Time between two looks at a live session.
+const LOOK: Duration = Duration::from_millis(4);
 /// Edge of a brick, voxels.
 const BRICK: usize = 8;
 
@@ -43,40 +48,56 @@ pub(crate) struct Shot {
     /// View of the tick.
     pub view: View,
     /// Voxels of the CT that changed since the last shot.
-    pub changes: Vec<Change>,
+    pub voxels: Vec<SceneChange>,
     /// Nodes of the cut that changed since the last shot.
-    pub cuts: Vec<Change>,
-    /// Positions of the brain's nodes, mm, in some of the shots.
-    pub positions: Option<Vec<Vec3>>,
+    pub cuts: Vec<SceneChange>,
+    /// Displacements of the brain's nodes from rest, in steps of [`NODE_STEP_MM`], in some of the
+    /// shots.
+    pub nodes: Option<Vec<[i16; 3]>>,
 }
 
-/// A voxel whose density changed, or a node whose depth in the cut did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Change {
-    /// Index of the voxel or node.
-    pub at: IVec3,
-    /// Density, HU, or the cut's value before.
-    pub before: i16,
-    /// The same after.
-    pub after: i16,
+/// Displacements of nodes as a film holds them.
+pub(crate) fn displacements(positions: &[Vec3], rest: &[Vec3]) -> Vec<[i16; 3]> {
+    let steps = |(now, rest): (&Vec3, &Vec3)| ((*now - *rest) / NODE_STEP_MM).round().to_array().map(|mm| mm as i16);
+    positions.iter().zip(rest).map(steps).collect()
+}
+
+/// Position of a node that a film holds, mm.
+pub(crate) fn position(rest: Vec3, [x, y, z]: [i16; 3]) -> Vec3 {
+    rest + NODE_STEP_MM * Vec3::new(x.into(), y.into(), z.into())
 }
 
 impl Shot {
+    /// As a scene file holds it.
+    fn record(&self) -> SceneRecord {
+        let View { time_ms, warnings, bone_open: open, removed_mm3, spindle, .. } = self.view;
+        let (voxels, cuts, nodes) = (self.voxels.clone(), self.cuts.clone(), self.nodes.clone());
+        let tick = self.view.sample.tick;
+        SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes }
+    }
+
+    /// From a scene file, on top of the view of its tick.
+    pub fn of(record: SceneRecord, view: View) -> Self {
+        let SceneRecord { time_ms, warnings, open: bone_open, removed_mm3, spindle, voxels, cuts, nodes, .. } = record;
+        Self { view: View { time_ms, warnings, bone_open, removed_mm3, spindle, ..view }, voxels, cuts, nodes }
+    }
+
     /// Writes the changes since the last shot into a skull, or takes them back; returns their
     /// number.
     pub fn write(&self, bone: &BoneVolume, forwards: bool) -> usize {
-        let value = |change: &Change| if forwards { change.after } else { change.before };
-        self.changes.iter().for_each(|change| bone.set_hu(change.at, value(change)));
+        let value = |change: &SceneChange| if forwards { change.after } else { change.before };
+        let place = |change: &SceneChange| IVec3::from(change.at.map(i32::from));
+        self.voxels.iter().for_each(|change| bone.set_hu(place(change), value(change)));
         let mut writer = bone.cut_writer();
-        self.cuts.iter().for_each(|change| _ = writer.set(change.at, value(change)));
-        self.changes.len() + self.cuts.len()
+        self.cuts.iter().for_each(|change| _ = writer.set(place(change), value(change)));
+        self.voxels.len() + self.cuts.len()
     }
 }
 
-/// Takes the shots of a replay.
+/// Takes the shots of a session.
 pub(crate) struct Filming {
-    shots: Sender<Shot>,
     skull: Option<Carved>,
+    rest: Vec<Vec3>,
     next_ms: f64,
     brain_every_ms: f64,
     next_brain_ms: f64,
@@ -85,31 +106,57 @@ pub(crate) struct Filming {
 }
 
 impl Filming {
-    /// Makes a film of a session of `length_ms` that carves `bone`, and the receiver of its shots.
-    pub fn new(bone: Option<Arc<BoneVolume>>, length_ms: f64) -> (Self, Receiver<Shot>) {
-        let (shots, coming) = channel();
-        let brain_every_ms = (length_ms / BRAINS).max(SHOT_MS);
+    /// Makes a film of a session that carves `bone`, with a brain whose nodes are at `rest`. A
+    /// length of `None` is not known yet.
+    pub fn new(bone: Option<Arc<BoneVolume>>, rest: Vec<Vec3>, length_ms: Option<f64>) -> Self {
+        let brain_every_ms = length_ms.map_or(BRAIN_MS, |length_ms| (length_ms / BRAINS).max(SHOT_MS));
         let (skull, last_notices) = (bone.map(Carved::of), (0, None));
-        (Self { shots, skull, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }, coming)
+        Self { skull, rest, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }
     }
 
     /// Takes a shot of a tick if one is due, if there is a new notice, or if it is the last tick.
-    /// `brain` copies the positions of the brain's nodes. Returns false once the receiver is gone.
-    pub fn tick(&mut self, view: View, last: bool, brain: impl FnOnce() -> Option<Vec<Vec3>>) -> bool {
+    /// `brain` gives the positions of the brain's nodes.
+    pub fn tick<'a>(&mut self, view: View, last: bool, brain: impl FnOnce() -> Option<&'a [Vec3]>) -> Option<Shot> {
         let time_ms = view.time_ms;
         let notices = (view.warnings, view.news);
         let new = std::mem::replace(&mut self.last_notices, notices) != notices;
         if time_ms < self.next_ms && !last && !new {
-            return true;
+            return None;
         }
         self.next_ms = time_ms + SHOT_MS;
         let moved = time_ms >= self.next_brain_ms || last;
         if moved {
             self.next_brain_ms = time_ms + self.brain_every_ms;
         }
-        let positions = moved.then(brain).flatten();
-        let (changes, cuts) = self.skull.as_mut().map(Carved::changes).unwrap_or_default();
-        self.shots.send(Shot { view, changes, cuts, positions }).is_ok()
+        let nodes = moved.then(brain).flatten().map(|positions| displacements(positions, &self.rest));
+        let (voxels, cuts) = self.skull.as_mut().map(Carved::changes).unwrap_or_default();
+        Some(Shot { view, voxels, cuts, nodes })
+    }
+
+    /// Films a live session into its scene file until it is over; returns why the film ended early.
+    pub fn live(
+        mut self,
+        mut writer: SceneWriter,
+        mut view: Reader<View>,
+        mut brain: Option<Reader<Vec<Vec3>>>,
+        stop: &Stop,
+    ) -> Option<String> {
+        let mut fault = None;
+        loop {
+            let (now, over) = (*view.latest().0, stop.asked());
+            let last = over || now.finished;
+            let positions = brain.as_mut().map(|brain| brain.latest().0.as_slice());
+            let shot = self.tick(now, last, || positions);
+            if let (None, Some(shot)) = (&fault, &shot) {
+                fault = writer.write(&shot.record()).err();
+            }
+            if last {
+                break;
+            }
+            std::thread::sleep(LOOK);
+        }
+        fault = fault.or(writer.finish().err());
+        fault.map(|fault| format!("the film for a replay ended early: {fault}"))
     }
 }
 
@@ -131,7 +178,7 @@ impl Carved {
     }
 
     /// Voxels of the CT and nodes of the cut that changed since the last call.
-    fn changes(&mut self) -> (Vec<Change>, Vec<Change>) {
+    fn changes(&mut self) -> (Vec<SceneChange>, Vec<SceneChange>) {
         let Self { bone, versions, last, last_cut } = self;
         let [nx, ny, nz] = bone.dims();
         let edge = BRICK as i32 * bone.cut_nodes();
@@ -143,7 +190,8 @@ impl Carved {
                 let at = IVec3::new(i as i32, j as i32, k as i32);
                 let (was, after) = (&mut last[i + nx * (j + ny * k)], bone.ct(at));
                 if *was != after {
-                    changes.push(Change { at, before: std::mem::replace(was, after), after });
+                    let before = std::mem::replace(was, after);
+                    changes.push(SceneChange { at: at.to_array().map(|n| n as u16), before, after });
                 }
             }
             let low = edge * IVec3::from(brick.map(|b| b as i32));
@@ -157,7 +205,8 @@ impl Carved {
             {
                 let n = n as i32;
                 let at = low + IVec3::new(n % edge, n / edge % edge, n / (edge * edge));
-                cuts.push(Change { at, before: std::mem::replace(was, after), after });
+                let before = std::mem::replace(was, after);
+                cuts.push(SceneChange { at: at.to_array().map(|n| n as u16), before, after });
             }
         });
         (changes, cuts)
@@ -200,7 +249,8 @@ pub(crate) mod tests {
         let volume = VoxelVolume::isotropic([19, 17, 11], Vec3::ZERO, 1.0, 900i16);
         let made = |volume: &VoxelVolume<i16>| Arc::new(BoneVolume::new(volume, 400).unwrap());
         let (carved, shown) = (made(&volume), made(&volume));
-        let (mut filming, receiver) = Filming::new(Some(carved.clone()), 1000.0);
+        let mut filming = Filming::new(Some(carved.clone()), vec![Vec3::ZERO], Some(1000.0));
+        let mut shots = Vec::new();
         let mut random = fastrand::Rng::with_seed(7);
         let mut states = Vec::new();
         for ms in 0..1000 {
@@ -208,12 +258,12 @@ pub(crate) mod tests {
             carved.set_hu(place, if ms % 3 == 0 { 700 } else { AIR_HU });
             assert!(carved.cut_writer().set(2 * place, random.i16(0..CUT_SURFACE)));
             let taken = filming.next_ms <= f64::from(ms);
-            assert!(filming.tick(view(ms.into()), ms == 999, || Some(vec![Vec3::splat(ms as f32)])));
+            let brain = [Vec3::splat(0.1 * ms as f32)];
+            shots.extend(filming.tick(view(ms.into()), ms == 999, || Some(&brain)));
             if taken || ms == 999 {
                 states.push(state(&carved));
             }
         }
-        let shots: Vec<Shot> = receiver.try_iter().collect();
         assert!(shots.len() == states.len() && (30..33).contains(&shots.len()), "{}", shots.len());
         for (shot, state) in shots.iter().zip(&states) {
             assert!(shot.write(&shown, true) > 0);
@@ -223,29 +273,26 @@ pub(crate) mod tests {
             shot.write(&shown, false);
         }
         assert!(state(&shown) == state(&made(&volume)));
-        assert_eq!(shots.last().unwrap().positions, Some(vec![Vec3::splat(999.0)]));
+        let last = shots.last().and_then(|shot| shot.nodes.clone()).unwrap();
+        assert!(position(Vec3::ZERO, last[0]).distance(Vec3::splat(99.9)) < NODE_STEP_MM);
     }
 
     #[test]
     fn a_warning_has_a_shot_of_its_own() {
-        let (mut filming, receiver) = Filming::new(None, 1000.0);
-        for ms in 0..30 {
+        let mut filming = Filming::new(None, Vec::new(), Some(1000.0));
+        let mut of = |ms: u32| {
             let warnings = u32::from((13..20).contains(&ms));
-            assert!(filming.tick(View { warnings, ..view(ms.into()) }, false, || None));
-        }
-        let shots: Vec<_> = receiver.try_iter().map(|shot| (shot.view.time_ms, shot.view.warnings)).collect();
+            filming.tick(View { warnings, ..view(ms.into()) }, false, || None)
+        };
+        let shots: Vec<_> = (0..30).filter_map(&mut of).map(|shot| (shot.view.time_ms, shot.view.warnings)).collect();
         assert_eq!(shots, [(0.0, 0), (13.0, 1), (20.0, 0)]);
     }
 
     #[test]
-    fn long_films_hold_fewer_brains_and_a_dropped_receiver_ends_them() {
-        let (mut filming, receiver) = Filming::new(None, 3.6e6);
-        for ms in 0..10_000 {
-            filming.tick(view(ms.into()), false, || Some(Vec::new()));
-        }
-        let kept: Vec<bool> = receiver.try_iter().map(|shot| shot.positions.is_some()).collect();
+    fn long_films_hold_fewer_brains() {
+        let mut filming = Filming::new(None, Vec::new(), Some(3.6e6));
+        let shots = (0..10_000).filter_map(|ms| filming.tick(view(ms.into()), false, || Some(&[])));
+        let kept: Vec<bool> = shots.map(|shot| shot.nodes.is_some()).collect();
         assert!(kept.len() > 280 && kept.iter().filter(|kept| **kept).count() == 10, "{}", kept.len());
-        drop(receiver);
-        assert!(!filming.tick(view(1e5), false, || None));
     }
 }

@@ -13,7 +13,8 @@ pub(crate) mod threads;
 pub(crate) mod watch;
 
 use crate::force_scale::ForceScale;
-use crate::run::film::Shot;
+use crate::program::Program;
+use crate::run::film::{Filming, Shot};
 use crate::run::journal::Written;
 use crate::run::stop::Stop;
 use crate::run::watch::Share;
@@ -27,9 +28,10 @@ use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
-use trepan_geometry::Vec3;
-use trepan_link::Recorder;
+use trepan_geometry::{Buttons, ToolState, Vec3};
 use trepan_link::cell::{Reader, Writer, cell};
+use trepan_link::wire::TickRecord;
+use trepan_link::{Recorder, SceneWriter};
 use trepan_soft::Loads;
 
 /// What a live session and a replay need.
@@ -42,6 +44,8 @@ pub(crate) struct Run<'a> {
     pub recorder: Recorder,
     /// Publishes the records, where the session is shared.
     pub share: Option<Share>,
+    /// Film of a live session, and the file that it goes to.
+    pub scene: Option<(Filming, SceneWriter)>,
     /// Ends the session.
     pub stop: &'a Stop,
 }
@@ -125,6 +129,26 @@ impl View {
     }
 }
 
+impl View {
+    /// The same view at a recorded tick: pose, tool, forces, depths.
+    pub fn on(self, record: &TickRecord, program: Program) -> Self {
+        let &TickRecord { tick, proxy, twist, buttons, time_ms, tool: slot, .. } = record;
+        let state = ToolState { world_from_tool: proxy, twist, buttons: Buttons(buttons), time_ms };
+        let tray = program.tray();
+        let slot = usize::from(slot).min(tray.len() - 1);
+        let drilling = record.has(TickRecord::DRILLING);
+        Self {
+            sample: ToolSample { tick, state, tool: tray[slot], slot, drilling },
+            time_ms,
+            force: record.wrench.force,
+            task_n: self.force_scale.task_n(record),
+            depth_mm: [record.depth_mm, record.tissue_depth_mm],
+            brain_distance_mm: record.brain_distance_mm,
+            ..self
+        }
+    }
+}
+
 /// Read ends for rendering.
 pub(crate) struct RenderInputs {
     /// Newest tick.
@@ -152,6 +176,10 @@ pub(crate) struct Cells {
     pub soft: (Writer<SoftFrame>, Reader<SoftFrame>),
     /// Solver loop to rendering.
     pub shown: (Writer<SoftFrame>, Reader<SoftFrame>),
+    /// Haptic loop to the film.
+    pub filmed: (Writer<View>, Reader<View>),
+    /// Solver loop to the film: node positions, mm.
+    pub nodes: (Writer<Vec<Vec3>>, Reader<Vec<Vec3>>),
 }
 
 impl Cells {
@@ -168,6 +196,8 @@ impl Cells {
             patch: cell((0, SurfacePatch::default())),
             loads: cell((0, Loads { contacts: NodalContacts::with_room(), ..Loads::default() })),
             soft: cell(frame.clone()),
+            filmed: cell(view),
+            nodes: cell(frame.positions.clone()),
             shown: cell(frame),
         }
     }
@@ -261,7 +291,6 @@ impl Ticks {
 
     /// Counts one tick.
     pub fn add(&mut self, tick: &Tick) {
-        use trepan_link::wire::TickRecord;
         self.count += 1;
         self.late += u64::from(tick.record.has(TickRecord::LATE));
         self.held += u64::from(tick.record.has(TickRecord::HELD));

@@ -23,6 +23,7 @@ use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_contact::{GuardedWrench, SurfacePatch};
+use trepan_geometry::Vec3;
 use trepan_haptics::{HapticDevice, Status};
 use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
@@ -123,6 +124,10 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
             record.compute_us = us;
             ends.records.send(record);
             ends.shown.write(|frame| stage.publish(frame));
+            ends.nodes.write(|nodes| {
+                nodes.clear();
+                nodes.extend_from_slice(stage.positions());
+            });
         }
     }
     let span_ms = (clock.now_ms() - begin_ms).max(1e-3);
@@ -132,7 +137,7 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
 /// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
 /// on the calling thread.
 pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
-    let Run { stages, start, recorder, share, stop } = run;
+    let Run { stages, start, recorder, share, scene, stop } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
     let (senders, receivers) = journal();
@@ -143,23 +148,29 @@ pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOn
     let second = second.zip(devices.second.map(owned));
     let second = second.map(|(stage, owner)| Second { stage, owner, records: seconds });
     let hands = Hands { stage: haptic, owner, second };
+    let simulating = tissue.is_some();
     let inputs = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
-        let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
+        let (tool, view, patch) = (cells.tool.0, cells.view.0, cells.patch.1);
+        let ends = HapticEnds { tool, view, filmed: cells.filmed.0, patch, ticks, notices };
+        let nodes = simulating.then_some(cells.nodes.1);
+        let filming = scene.map(|(film, writer)| scope.spawn(move || film.live(writer, cells.filmed.1, nodes, stop)));
         let feeling = scope.spawn(move || haptic_loop(hands, ends, clock, pace, stop));
-        let simulating = tissue.map(|tissue| {
+        let solving = tissue.map(|tissue| {
             let (tool, soft, patch, loads) = (cells.tool.1, cells.soft.1, cells.patch.0, cells.loads.0);
             let ends = CollisionEnds { tool, soft, patch, loads, records: collisions };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
-            let ends = SolverEnds { loads: cells.loads.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
+            let (soft, shown, nodes) = (cells.soft.0, cells.shown.0, cells.nodes.0);
+            let ends = SolverEnds { loads: cells.loads.1, soft, shown, nodes, records: solver };
             (colliding, scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop)))
         });
         picture(inputs);
         stop.ask();
         let panicked = || vec!["the haptic thread panicked; force set to zero, device closed".to_string()];
-        let outcome = feeling.join().unwrap_or_else(|_| Outcome { remarks: panicked(), ..Outcome::default() });
-        let solver = simulating.map(|(colliding, solving)| {
+        let mut outcome = feeling.join().unwrap_or_else(|_| Outcome { remarks: panicked(), ..Outcome::default() });
+        outcome.remarks.extend(filming.and_then(|filming| filming.join().ok().flatten()));
+        let solver = solving.map(|(colliding, solving)| {
             let solver = solving.join().unwrap_or_default();
             SolverOutcome { collision_times: colliding.join().unwrap_or_default(), ..solver }
         });
@@ -206,6 +217,7 @@ impl Drop for HapticDeviceOwner {
 struct HapticEnds {
     tool: Writer<ToolSample>,
     view: Writer<View>,
+    filmed: Writer<View>,
     patch: Reader<Numbered<SurfacePatch>>,
     ticks: Sender<TickRecord>,
     notices: Sender<Notice>,
@@ -216,6 +228,7 @@ impl HapticEnds {
     fn publish(&mut self, tick: &Tick, view: View) {
         self.tool.set(tick.sample);
         self.view.set(view);
+        self.filmed.set(view);
         self.ticks.send(tick.record);
     }
 }
@@ -274,6 +287,7 @@ struct SolverEnds {
     loads: Reader<Numbered<Loads>>,
     soft: Writer<SoftFrame>,
     shown: Writer<SoftFrame>,
+    nodes: Writer<Vec<Vec3>>,
     records: Sender<SolverRecord>,
 }
 

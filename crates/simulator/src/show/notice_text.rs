@@ -9,7 +9,7 @@ use trepan_geometry::{Buttons, Tool};
 use trepan_render::window::{Choice, Panel, Sound};
 
 /// Time for which a notice is shown, ms.
-const NEWS_MS: f64 = 4000.0;
+pub(super) const NEWS_MS: f64 = 4000.0;
 
 /// Warnings of harm to the patient, which sound the alarm, the most urgent first.
 const DANGERS: [Warning; 6] = [

@@ -1,27 +1,35 @@
 //! Player of a recorded session in the window: run, pause, seek.
 //!
 //! # Practice
-//! The film is made at full speed while it is shown ([`crate::run::film`]); the time bar shows how
-//! far it is made. Seeking writes the voxels and nodes that changed in between, some 20 ns each, at
-//! most [`MAX_VOXELS`] per picture: a longer jump takes a few pictures. The brain's nodes are
-//! interpolated between the shots that hold them.
+//! Pose, tool, forces and depths are those of the recorded tick, at any time at once. Skull and
+//! brain are the session's film ([`crate::run::film`]), read from its file or made while it is
+//! shown; then the window says how far it is. Seeking writes the voxels and nodes that changed in
+//! between, some 20 ns each, at most [`MAX_VOXELS`] per picture: a longer jump takes a few pictures.
+//! The brain's nodes are interpolated between the shots that hold them.
 
+use crate::printable::capital;
+use crate::program::Program;
 use crate::run::View;
-use crate::run::film::Shot;
+use crate::run::film::{Shot, position};
 use crate::run::lockstep::up_to;
 use crate::run::stop::Stop;
+use crate::show::notice_text::NEWS_MS;
 use crate::show::picture::Album;
 use crate::show::window::{self, Opened, Shown};
+use crate::stages::second_hand::SecondView;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use trepan_geometry::Vec3;
 use trepan_link::Recording;
+use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
 use trepan_render::{Camera, Frame, Image, Painter};
 use trepan_volume::BoneVolume;
 
 /// Largest number of voxels and nodes written per picture: some 10 ms.
 const MAX_VOXELS: usize = 500_000;
+/// Time by which the film may be behind without a word, s.
+const BEHIND_S: f64 = 0.2;
 /// Kinds of events without marks on the time bar: they come many times a second.
 const STREAMED: [&str; 1] = ["score"];
 
@@ -35,7 +43,8 @@ struct Film {
     bone: Option<Arc<BoneVolume>>,
     /// Index of the present shot.
     at: usize,
-    /// Positions of the brain's nodes, mm.
+    /// Positions of the brain's nodes at rest and now, mm.
+    rest: Vec<Vec3>,
     positions: Vec<Vec3>,
 }
 
@@ -77,18 +86,23 @@ impl Film {
 
     /// Interpolates the brain's nodes between the nearest shots that hold them.
     fn place_brain(&mut self) {
-        let kept = |(at, shot): (usize, &Shot)| shot.positions.is_some().then_some(at);
+        let kept = |(at, shot): (usize, &Shot)| shot.nodes.is_some().then_some(at);
         let before = self.shots.iter().enumerate().take(self.at + 1).rev().find_map(kept);
         let after = self.shots.iter().enumerate().skip(self.at + 1).find_map(kept);
-        let positions = |at: usize| self.shots.get(at).and_then(|shot| shot.positions.as_ref());
-        let Some(from) = before.and_then(positions) else { return };
-        self.positions.clone_from(from);
-        if let (Some(before), Some(after)) = (before, after) {
-            let span_ms = self.time_ms(after) - self.time_ms(before);
-            let share = ((self.time_ms(self.at) - self.time_ms(before)) / span_ms.max(1e-9)) as f32;
-            let to = positions(after).into_iter().flatten();
-            self.positions.iter_mut().zip(to).for_each(|(at, to)| *at = at.lerp(*to, share));
-        }
+        let nodes = |at: usize| self.shots.get(at).and_then(|shot| shot.nodes.as_ref());
+        let Some(from) = before.and_then(nodes) else { return };
+        let (to, share) = match (before, after, after.and_then(nodes)) {
+            (Some(before), Some(after), Some(to)) => {
+                let span_ms = self.time_ms(after) - self.time_ms(before);
+                (to, ((self.time_ms(self.at) - self.time_ms(before)) / span_ms.max(1e-9)) as f32)
+            }
+            _ => (from, 0.0),
+        };
+        let node = |(rest, (from, to)): (&Vec3, (&[i16; 3], &[i16; 3]))| {
+            position(*rest, *from).lerp(position(*rest, *to), share)
+        };
+        self.positions.clear();
+        self.positions.extend(self.rest.iter().zip(from.iter().zip(to)).map(node));
     }
 }
 
@@ -98,6 +112,8 @@ struct Player {
     timeline: Timeline,
     now_s: Option<f64>,
     first: View,
+    recording: Arc<Recording>,
+    program: Program,
     shown: Shown,
     hint: String,
     /// Time at which the window closes, s.
@@ -110,19 +126,22 @@ pub(crate) fn show(
     coming: Receiver<Shot>,
     painter: Painter,
     opened: &Opened<'_>,
-    recording: &Recording,
+    recording: &Arc<Recording>,
     until_s: f64,
     stop: &Stop,
 ) -> Album {
     let bone = opened.table.scene.bone.clone().filter(|_| opened.table.program.has_bone());
+    let rest = opened.table.scene.brain.as_ref().map(|brain| brain.mesh.positions.clone()).unwrap_or_default();
     let player = Player {
         timeline: timeline(recording, until_s),
         now_s: None,
         first,
+        recording: recording.clone(),
+        program: opened.table.program,
         shown: Shown::of(opened, bone.is_some(), stop),
         hint: recording.losses().map_or_else(|| HINT.into(), |losses| format!("not a whole recording: {losses}")),
         until_s,
-        film: Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() },
+        film: Film { shots: Vec::new(), coming, bone, at: 0, rest, positions: Vec::new() },
     };
     let (player, album) = window::run(player, painter, opened, first);
     player.shown.finish(album)
@@ -132,7 +151,7 @@ pub(crate) fn show(
 fn timeline(recording: &Recording, until_s: f64) -> Timeline {
     let marked =
         recording.events.iter().filter(|event| event.kind != "cleared" && !STREAMED.contains(&event.kind.as_str()));
-    let mark = |event: &trepan_link::wire::EventRecord| Mark {
+    let mark = |event: &EventRecord| Mark {
         at_s: event.time_ms * 1e-3,
         text: event.text.clone(),
         warning: event.kind == "warning",
@@ -170,13 +189,14 @@ impl Session for Player {
         let passed_s = input.seconds - self.now_s.replace(input.seconds).unwrap_or(input.seconds);
         advance(&mut self.timeline, input.playback, passed_s);
         self.film.go_to(self.timeline.at_s * 1e3);
-        let panel = self.shown.panel(self.view(), false);
+        let mut panel = self.shown.panel(&self.view(), false);
+        panel.news.extend(self.news());
         let finished = self.shown.stop.asked() || input.seconds > self.until_s;
         Panel { hint: self.hint.clone(), timeline: Some(self.timeline.clone()), finished, ..panel }
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
-        self.shown.frame(camera, self.view(), &self.film.positions)
+        self.shown.frame(camera, &self.view(), &self.film.positions)
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {
@@ -185,18 +205,42 @@ impl Session for Player {
 }
 
 impl Player {
-    fn view(&self) -> &View {
-        self.film.shots.get(self.film.at).map_or(&self.first, |shot| &shot.view)
+    /// What the recorded tick felt, over the skull and the brain of the film.
+    fn view(&self) -> View {
+        let of_film = self.film.shots.get(self.film.at).map_or(self.first, |shot| shot.view);
+        let (ticks, at_ms) = (&self.recording.ticks, 1e3 * self.timeline.at_s);
+        let tick = ticks.partition_point(|tick| tick.time_ms <= at_ms).checked_sub(1).and_then(|at| ticks.get(at));
+        let view = tick.map_or(of_film, |tick| View { news: None, ..of_film.on(tick, self.program) });
+        let seconds = &self.recording.second;
+        let second =
+            seconds.partition_point(|tick| tick.time_ms <= at_ms).checked_sub(1).and_then(|at| seconds.get(at));
+        let held = |tick: &SecondRecord| SecondView { world_from_tool: tick.proxy, force: tick.wrench.force };
+        View { second: second.map(held).or(view.second), ..view }
+    }
+
+    /// The newest event while it is recent, and how far the film is if it is behind.
+    fn news(&self) -> Vec<String> {
+        let Timeline { at_s, ready_s, length_s, .. } = self.timeline;
+        let events = self.recording.events.iter();
+        let is_shown = |event: &&EventRecord| {
+            let age_ms = 1e3 * at_s - event.time_ms;
+            (0.0..NEWS_MS).contains(&age_ms) && !["warning", "cleared"].contains(&&*event.kind)
+        };
+        let event = events.filter(|event| !STREAMED.contains(&&*event.kind)).filter(is_shown).last();
+        let behind = at_s > ready_s + BEHIND_S;
+        let behind = behind.then(|| format!("skull and brain are computed: {ready_s:.0} s of {length_s:.0} s"));
+        behind.into_iter().chain(event.map(|event| capital(&event.text))).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::film::Change;
+    use crate::run::film::displacements;
     use crate::run::film::tests::view;
     use glam::IVec3;
     use std::sync::mpsc::channel;
+    use trepan_link::SceneChange;
     use trepan_link::wire::TickRecord;
     use trepan_volume::VoxelVolume;
 
@@ -207,12 +251,12 @@ mod tests {
         let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
         let (sender, coming) = channel();
         for n in 0..count {
-            let voxel = IVec3::new(n as i32 % 40, n as i32 / 40, 1);
-            let changes = vec![Change { at: voxel, before: 900, after: -1000 }];
-            let positions = (n % 2 == 0).then(|| vec![Vec3::X * n as f32]);
-            sender.send(Shot { view: view(10.0 * n as f64), changes, cuts: Vec::new(), positions }).unwrap();
+            let at = [n % 40, n / 40, 1].map(|n| n as u16);
+            let voxels = vec![SceneChange { at, before: 900, after: -1000 }];
+            let nodes = (n % 2 == 0).then(|| displacements(&[Vec3::X * 0.25 * n as f32], &[Vec3::ZERO]));
+            sender.send(Shot { view: view(10.0 * n as f64), voxels, cuts: Vec::new(), nodes }).unwrap();
         }
-        let mut film = Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() };
+        let mut film = Film { shots: Vec::new(), coming, bone, at: 0, rest: vec![Vec3::ZERO], positions: Vec::new() };
         film.grow();
         film.write(0, true);
         film
@@ -226,10 +270,10 @@ mod tests {
         for (time_ms, shot) in [(995.0, 99), (0.0, 0), (1990.0, 199), (501.0, 50), (500.0, 50), (-5.0, 0), (1e9, 199)] {
             film.go_to(time_ms);
             assert_eq!((film.at, gone()), (shot, shot + 1), "at {time_ms} ms");
-            assert!((film.positions[0].x - shot as f32).abs() < 1.0 + 1e-3, "{}", film.positions[0].x);
+            assert!((4.0 * film.positions[0].x - shot as f32).abs() < 1.0 + 1e-3, "{}", film.positions[0].x);
         }
         film.go_to(510.0);
-        assert_eq!(film.positions[0].x, 51.0, "between the brains of shots 50 and 52");
+        assert_eq!(4.0 * film.positions[0].x, 51.0, "between the brains of shots 50 and 52");
     }
 
     #[test]
@@ -252,7 +296,7 @@ mod tests {
 
     #[test]
     fn marks_are_events_without_streamed_ones() {
-        let event = |kind: &str, text: &str| trepan_link::wire::EventRecord {
+        let event = |kind: &str, text: &str| EventRecord {
             kind: kind.into(),
             text: text.into(),
             time_ms: 1500.0,

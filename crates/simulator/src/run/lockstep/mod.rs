@@ -27,7 +27,7 @@ use crate::stages::collision_step::SoftFrame;
 use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use crate::stages::second_hand::{SecondHand, SecondView};
 use std::collections::VecDeque;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::channel;
 use std::thread;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::{Buttons, Pose, ToolState, Wrench};
@@ -52,14 +52,16 @@ pub(crate) fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
 pub(crate) fn run(
     run: Run<'_>,
     (recording, end_ms): (&Recording, f64),
-    film: Option<(Filming, Receiver<Shot>)>,
+    film: Option<Filming>,
     picture: impl FnOnce(RenderInputs),
 ) -> Outcome {
-    let Run { stages, start, recorder, share, stop } = run;
+    let Run { stages, start, recorder, share, stop, .. } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
     let (senders, receivers) = journal();
-    let (mut film, shots) = film.unzip();
+    let (sender, shots) = channel::<Shot>();
+    let shots = film.is_some().then_some(shots);
+    let mut film = film;
     let soft = stages.tissue.is_some().then_some(cells.shown.1);
     let inputs = RenderInputs { view: cells.view.1, soft, film: shots };
     thread::scope(|scope| {
@@ -75,8 +77,10 @@ pub(crate) fn run(
                 }
                 let now = replay.tick(record, &clock);
                 view.set(now);
-                let brain = || replay.tissue.as_ref().map(|tissue| tissue.solver.positions().to_vec());
-                film.take_if(|film| !film.tick(now, last == Some(record.tick), brain));
+                let brain = || replay.tissue.as_ref().map(|tissue| tissue.solver.positions());
+                let shot = film.as_mut().and_then(|film| film.tick(now, last == Some(record.tick), brain));
+                // Nobody looks any more.
+                film.take_if(|_| shot.is_some_and(|shot| sender.send(shot).is_err()));
                 if let Some(tissue) = replay.tissue.as_ref().filter(|_| film.is_none()) {
                     shown.write(|frame| tissue.solver.publish(frame));
                 }
