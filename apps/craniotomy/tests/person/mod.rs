@@ -38,13 +38,15 @@ impl Person {
         let display = format!(":{}", number.trim());
         fs::create_dir_all(home.join("config")).unwrap();
         fs::write(home.join("config/settings.json"), settings).unwrap();
-        let program = Command::new(env!("CARGO_BIN_EXE_craniotomy"))
+        let file = std::env::var_os("TREPAN_PERSON_PROGRAM").unwrap_or(env!("CARGO_BIN_EXE_craniotomy").into());
+        let said = fs::File::create(home.join("said")).unwrap();
+        let program = Command::new(file)
             .env("DISPLAY", &display)
             .env("TREPAN_CONFIG", home.join("config"))
             .env("TREPAN_SESSIONS", home.join("sessions"))
             .env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"))
             .stdout(Stdio::null())
-            .stderr(Stdio::null())
+            .stderr(said)
             .spawn()
             .unwrap();
         let person = Self { screen, program, display, home: home.into() };
@@ -94,7 +96,8 @@ impl Person {
 
     /// Folders of the sessions that hold a file.
     fn sessions(&self, with: &str) -> Vec<PathBuf> {
-        let entries = fs::read_dir(self.home.join("sessions/craniotomy")).into_iter().flatten().flatten();
+        let programs = fs::read_dir(self.home.join("sessions")).into_iter().flatten().flatten();
+        let entries = programs.flat_map(|program| fs::read_dir(program.path()).into_iter().flatten().flatten());
         entries.map(|entry| entry.path()).filter(|path| path.join(with).is_file()).collect()
     }
 
@@ -114,12 +117,14 @@ impl Person {
         std::thread::sleep(Duration::from_secs(2));
     }
 
-    /// Ends the nth session, and waits for its summary and its result page.
+    /// Ends the nth session, says yes to the question, and waits for its summary and its result page.
     pub fn ends(&self, nth: usize) -> serde_json::Value {
         // A slow picture may miss a click.
         self.waits_for("the summary", || {
             if self.sessions("summary.json").len() < nth {
                 self.clicks(END);
+                self.does("key Return");
+                std::thread::sleep(Duration::from_millis(700));
             }
             self.sessions("summary.json").len() == nth
         });
@@ -147,6 +152,16 @@ impl Person {
     /// Number of its events whose text contains some words.
     pub fn heard(&self, words: &str) -> usize {
         self.recording().events.iter().filter(|event| event.text.contains(words)).count()
+    }
+
+    /// Whether the program still runs.
+    pub fn is_there(&self) -> bool {
+        Path::new(&format!("/proc/{}/exe", self.program.id())).exists()
+    }
+
+    /// What the program wrote on its console.
+    pub fn said(&self) -> String {
+        fs::read_to_string(self.home.join("said")).unwrap_or_default()
     }
 
     /// Does nothing for some seconds.

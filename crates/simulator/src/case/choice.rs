@@ -192,7 +192,7 @@ fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
 
 /// Recipe from the flags; missing values are those of preset `usual`, so a folder is the same on
 /// every machine.
-fn recipe(patient: &Patient) -> Recipe {
+pub(super) fn recipe(patient: &Patient) -> Recipe {
     let usual = models::usual();
     Recipe {
         spacing_mm: patient.spacing_mm.unwrap_or(usual.bone.spacing_mm as f32),

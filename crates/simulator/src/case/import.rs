@@ -31,6 +31,7 @@ use crate::recipe::Recipe;
 use glam::DAffine3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
@@ -135,7 +136,7 @@ impl<'a> PendingCase<'a> {
     /// Empty if no opening is found.
     pub fn case_errors(&mut self, scene: &Scene, rows: &Rows, element: Element) -> Result<CaseErrors, SessionError> {
         let key = self.cache.under(&self.key, &CaseErrors::about(scene, rows, element));
-        if let Some(errors) = cached(self.cache, &key, ERRORS) {
+        if let Some(errors) = cached(self.cache, &key, ERRORS).or_else(|| shipped(&key)) {
             return Ok(errors);
         }
         if self.images.is_none() {
@@ -151,6 +152,16 @@ impl<'a> PendingCase<'a> {
         store(&errors, self.cache, &key, ERRORS);
         Ok(errors)
     }
+}
+
+/// Errors that were measured in the built-in case before it was shipped, by cache key.
+const SHIPPED: &str = include_str!("../../measured/built-in.json");
+
+/// Errors that come with the program; `None` for other images, choices or versions of the
+/// measurement.
+fn shipped(key: &str) -> Option<CaseErrors> {
+    let mut all: BTreeMap<String, CaseErrors> = serde_json::from_str(SHIPPED).ok()?;
+    all.remove(key)
 }
 
 fn measured(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> CaseErrors {
@@ -377,4 +388,63 @@ fn cached<T: DeserializeOwned>(cache: &Cache, key: &str, file: &str) -> Option<T
 fn store(value: &impl Serialize, cache: &Cache, key: &str, file: &str) {
     let write = |folder: &Path| Ok(std::fs::write(folder.join(file), serde_json::to_vec(value)?)?);
     cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not cached: {fault}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TissueSource;
+    use crate::case::choice;
+    use crate::models::ModelRequest;
+    use crate::options::Options;
+    use clap::Parser;
+
+    /// With `TREPAN_KEEP_MEASURED` the errors are measured, and kept in the file that is shipped.
+    #[test]
+    fn the_built_in_case_comes_with_its_measurements() {
+        let (home, head) = (tempfile::tempdir().unwrap(), trepan_fixtures::case_head());
+        let tissues = TissueSource::regions_of_aseg(head.aseg);
+        let inputs = Inputs {
+            name: Some(head.name),
+            ct: Some(head.ct),
+            mri: Some(head.mri),
+            labels: Some(head.labels),
+            tissues,
+        };
+        let patient = Options::try_parse_from(["x"]).unwrap().patient;
+        let (cache, recipe) = (Cache::at(home.path().into()), choice::recipe(&patient));
+        let keeps = std::env::var_os("TREPAN_KEEP_MEASURED").is_some();
+        let mut all = BTreeMap::new();
+        for program in [Program::Integrated, Program::Craniotomy, Program::Brain] {
+            let progress = Progress::default();
+            let mut pending = PendingCase::of(program, (&inputs, &recipe), &cache, &progress).unwrap();
+            pending.store();
+            let request = ModelRequest::to_plan(program, &patient, Default::default(), 1000.0, [960, 600]).unwrap();
+            for card in [false, true] {
+                let facts = pending.facts;
+                let settled = request.settle(
+                    &facts,
+                    || card,
+                    |scene, rows, element| {
+                        let key = cache.under(&pending.key, &CaseErrors::about(scene, rows, element));
+                        let errors = if keeps {
+                            pending.case_errors(scene, rows, element)?
+                        } else {
+                            shipped(&key).unwrap_or_default()
+                        };
+                        all.insert(key, errors.clone());
+                        Ok(errors)
+                    },
+                );
+                let measured = settled.unwrap().measured;
+                assert_eq!((measured.bone, measured.tissue), (program.has_bone(), program.has_tissue()), "{program:?}");
+            }
+        }
+        if keeps {
+            let file = concat!(env!("CARGO_MANIFEST_DIR"), "/measured/built-in.json");
+            std::fs::write(file, serde_json::to_string_pretty(&all).unwrap() + "\n").unwrap();
+        }
+        let shipped: BTreeMap<String, CaseErrors> = serde_json::from_str(SHIPPED).unwrap();
+        assert!(keeps || shipped == all, "run this test with TREPAN_KEEP_MEASURED=1 and build again");
+    }
 }

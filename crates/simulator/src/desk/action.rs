@@ -83,6 +83,8 @@ pub(crate) enum Action {
     Result(PathBuf),
     /// Opens a session's report in the browser.
     Report(PathBuf),
+    /// Opens a folder in the user's file manager.
+    Open(PathBuf),
     /// Replays a session's recording.
     Replay(PathBuf),
     /// Closes the window.

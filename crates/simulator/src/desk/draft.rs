@@ -8,7 +8,7 @@ use crate::case::folder;
 use crate::case::opening::Opening;
 use crate::error::SessionError;
 use crate::progress::{DraftSkull, Progress};
-use crate::show::picture::camera;
+use crate::show::picture::first_view;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -51,7 +51,7 @@ pub(crate) struct Looked {
 impl Looked {
     /// The skull of a cached case, seen over its opening.
     pub fn cached(folder: &Path) -> Result<Option<Self>, SessionError> {
-        let of = |(skull, opening): (_, Opening)| Self { skull, camera: camera(&opening.into()) };
+        let of = |(skull, opening): (_, Opening)| Self { skull, camera: first_view(&opening.into()) };
         Ok(folder::draft_skull(folder)?.map(of))
     }
 

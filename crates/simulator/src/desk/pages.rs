@@ -297,7 +297,9 @@ pub(crate) fn writing() -> Page<Action> {
 }
 
 /// Flags, and the controls of the window that do the same.
-const CONTROLS: [(&str, &str); 12] = [
+const CONTROLS: [(&str, &str); 14] = [
+    ("--ct PATH", "\"Open CT...\""),
+    ("--mri PATH", "\"Open MRI...\""),
     ("--tissue CLASS=PATH", "\"Tumour labels...\""),
     ("--tissue tumour", "\"Tumour labels\""),
     ("--labels PATH", "\"Brain labels...\""),
@@ -349,6 +351,24 @@ pub(crate) fn fault(fault: &SessionError, source: &Source) -> Page<Action> {
         foot: vec![
             Item::main("Back to the start page", "your choices are kept", Action::Home),
             Item::button("Quit", "closes the window", Action::Close),
+        ],
+        escape: Some(Action::Home),
+        ..Page::default()
+    }
+}
+
+/// The page that says that the desktop could not open a file.
+pub(crate) fn unopened(path: &Path) -> Page<Action> {
+    let problem = "No program of this desktop opens the file. Open it by hand:";
+    Page {
+        title: "The file was not opened".into(),
+        columns: vec![vec![
+            Item::Alert(problem.into()),
+            Item::named(printable(&path.display().to_string()), "tries again", Action::Open(path.into())),
+        ]],
+        foot: vec![
+            Item::main("Back to the start page", "your choices are kept", Action::Home),
+            Item::button("All sessions", "", Action::Sessions),
         ],
         escape: Some(Action::Home),
         ..Page::default()

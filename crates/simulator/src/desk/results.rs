@@ -44,7 +44,11 @@ pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Act
             Item::button("Open the report", "in the browser, where it can be printed", Action::Report(folder.into())),
             Item::button("Replay", "shows the session again", Action::Replay(folder.into())),
             Item::button("All sessions", "", Action::Sessions),
-            Item::Note(format!("its files: {}", printable(&folder.display().to_string()))),
+            Item::named(
+                printable(&folder.display().to_string()),
+                "opens the folder of its files",
+                Action::Open(folder.into()),
+            ),
         ],
         escape: Some(Action::Home),
         ..Page::default()

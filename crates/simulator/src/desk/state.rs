@@ -25,7 +25,7 @@ use crate::session::{Place, Session};
 use crate::training::Lesson;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::Listed;
 use trepan_render::window::{Host, Page, Shown, Stage, speak};
@@ -66,6 +66,8 @@ pub(crate) struct Desk {
     /// Dropped files and folders that still need a purpose.
     waiting: Vec<PathBuf>,
     devices: Receiver<Vec<Listed>>,
+    /// Files that the desktop could not open.
+    failed: (Sender<PathBuf>, Receiver<PathBuf>),
     stop: Stop,
     pictures: Pictures,
 }
@@ -99,6 +101,7 @@ impl Desk {
             viewed: None,
             waiting: Vec::new(),
             devices,
+            failed: channel(),
             stop,
             pictures: Pictures::default(),
         }
@@ -297,6 +300,9 @@ impl Host for Desk {
 
     fn shown(&mut self, guest: bool) -> Shown<Action> {
         self.form.devices.extend(self.devices.try_iter().flatten());
+        if let Some(path) = self.failed.1.try_iter().last() {
+            self.view = View::Page(Box::new(pages::unopened(&path)));
+        }
         if self.stop.asked() && !matches!(self.view, View::Session(..)) {
             return Shown::Nothing;
         }
@@ -486,7 +492,8 @@ impl Desk {
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
             }
-            Action::Report(folder) => open(&folder.join("report.html")),
+            Action::Report(folder) => self.open(&folder.join("report.html")),
+            Action::Open(folder) => self.open(&folder),
             Action::Replay(folder) => {
                 self.viewed = Some(folder.clone());
                 self.replay(&folder.join("session.mcap"));
@@ -497,15 +504,31 @@ impl Desk {
     }
 }
 
-/// Opens a page in the user's browser.
-fn open(page: &Path) {
-    let opener = if cfg!(target_os = "macos") {
-        "open"
-    } else if cfg!(windows) {
-        "explorer"
-    } else {
-        "xdg-open"
-    };
-    let begun = Command::new(opener).arg(page).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-    begun.err().into_iter().for_each(|fault| tracing::warn!("{opener}: {fault}; open {} by hand", page.display()));
+/// Programs that open files as the desktop does.
+const OPENER: &str = if cfg!(target_os = "macos") {
+    "open"
+} else if cfg!(windows) {
+    "explorer"
+} else {
+    "xdg-open"
+};
+
+impl Desk {
+    /// Opens a page or a folder as the desktop does; says so where that fails.
+    fn open(&self, path: &Path) {
+        let (path, failed) = (path.to_owned(), self.failed.0.clone());
+        // The desktop may take its time to find out that it cannot.
+        std::thread::spawn(move || {
+            let mut command = Command::new(OPENER);
+            let quiet = command.arg(&path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+            let fault = match quiet.status() {
+                Ok(status) if status.success() => return,
+                Ok(status) => format!("{OPENER} ended with {status}"),
+                Err(fault) => format!("{OPENER}: {fault}"),
+            };
+            tracing::warn!("{fault}; open {} by hand", path.display());
+            // Nobody listens once the window is closed.
+            _ = failed.send(path);
+        });
+    }
 }

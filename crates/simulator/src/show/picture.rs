@@ -86,6 +86,18 @@ pub(crate) fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, eye(site), 170.0)
 }
 
+/// Width of the first view of a window, mm, and its distance that gives it in a picture as high as
+/// wide.
+const FIRST_WIDE_MM: f32 = 80.0;
+
+/// Returns the first camera of a window: down the approach, close enough for the opening to fill the
+/// view. It is inclined as the microscope is.
+pub(crate) fn first_view(site: &Site) -> Camera {
+    let scope = microscope(site);
+    let fov_rad = camera(site).fov_rad;
+    Camera { fov_rad, distance_mm: 0.5 * FIRST_WIDE_MM / (0.5 * fov_rad).tan(), ..scope }
+}
+
 /// Returns the camera of the microscope: 250 mm from the site, with a field of some 50 mm. It is
 /// inclined by 15 degrees, so that a tool along the approach does not hide its tip.
 pub(crate) fn microscope(site: &Site) -> Camera {

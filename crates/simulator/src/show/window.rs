@@ -16,7 +16,7 @@ use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
-use crate::show::picture::{Album, Moving, camera, frame, microscope, snap};
+use crate::show::picture::{Album, Moving, first_view, frame, microscope, snap};
 use crate::show::raycast::Raycast;
 use crate::stages::notice::Notice;
 use crate::training::Guide;
@@ -26,11 +26,13 @@ use trepan_haptics::mouse::MouseHandle;
 use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
 use trepan_render::window::{self, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
-use trepan_render::{Camera, Frame, Image, Overlay, Painter};
+use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 
 /// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
 /// largest force at 2 N/mm.
 const LEASH_MM: f32 = 2.0;
+/// Distance from the opening within which the slices follow the tool, mm.
+const NEAR_MM: f32 = 25.0;
 /// Duration of a request, s: long enough that no tick misses it.
 const REQUEST_S: f64 = 0.1;
 
@@ -63,6 +65,8 @@ pub(super) struct Shown {
     /// Whether bone is shown.
     pub bone: bool,
     colours: Colours,
+    /// The place of the opening, RAS mm.
+    entry: Vec3,
     keeper: Keeper,
     /// Ends the session.
     pub stop: Stop,
@@ -76,6 +80,7 @@ impl Shown {
             program: opened.table.program,
             bone,
             colours: opened.table.colours(),
+            entry: opened.table.scene.site.entry,
             keeper: Keeper::into_folder(&opened.out.join("window")),
             stop: stop.clone(),
         }
@@ -93,7 +98,10 @@ impl Shown {
 
     /// Returns the frame of a state, with the brain at the given positions.
     pub fn frame<'a>(&'a self, camera: Camera, view: &View, positions: &'a [Vec3]) -> Frame<'a> {
-        frame(camera, view, Some(positions).filter(|p| !p.is_empty()), self.bone, &self.colours)
+        let frame = frame(camera, view, Some(positions).filter(|p| !p.is_empty()), self.bone, &self.colours);
+        // A tool that is still on its way shows air.
+        let far = view.sample.state.tip().distance(self.entry) > NEAR_MM;
+        Frame { slices: SliceLook { through: far.then_some(self.entry), ..frame.slices }, ..frame }
     }
 
     /// Keeps a picture of the window.
@@ -211,7 +219,7 @@ pub(crate) fn run<S: window::Session + Send>(
     at: View,
 ) -> (S, Album) {
     let (mut album, folder) = (Album::default(), opened.out.join("frames"));
-    let eye = camera(&opened.table.scene.site);
+    let eye = first_view(&opened.table.scene.site);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "before"));
     let start = Start::with(eye, at.sample.state.world_from_tool);
     let detail = opened.table.models.setup.picture.detail as f32;
@@ -444,6 +452,7 @@ mod tests {
                 program: Program::Brain,
                 bone: false,
                 colours: Colours::default(),
+                entry: Vec3::ZERO,
                 keeper: Keeper::into_folder(Path::new("nowhere")),
                 stop: Stop::default(),
             },
