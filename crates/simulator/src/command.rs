@@ -10,9 +10,10 @@ use crate::device_test;
 use crate::ingredients::table;
 use crate::inspect::inspect;
 use crate::models::ModelRequest;
-use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
+use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, SessionsTask, Task, rate};
 use crate::printable::printable;
 use crate::recordings;
+use crate::report::sessions;
 use crate::report::summary::{CutOff, slow};
 use crate::session::{Ended, Place, Session};
 use crate::show::driver;
@@ -124,6 +125,8 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
         }),
         Task::Recording(RecordingTask::Check { file }) => recordings::check(program, file),
         Task::Recording(RecordingTask::Repair { file, out }) => recordings::repair_file(file, out),
+        Task::Sessions(SessionsTask::List(wanted)) => sessions::list(wanted),
+        Task::Sessions(SessionsTask::Export { csv, wanted }) => sessions::export(wanted, csv),
         Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),
     };
     done.unwrap_or_else(|fault| failed(program, &fault))

@@ -223,6 +223,9 @@ pub enum Task {
     /// Check recordings, and repair truncated or damaged ones
     #[command(subcommand)]
     Recording(RecordingTask),
+    /// List the sessions that were kept, or write them as a table
+    #[command(subcommand)]
+    Sessions(SessionsTask),
     /// Print what a reader sees in an image, a DICOM folder, a mesh or a recording, without a case
     Inspect {
         /// A file or a folder
@@ -328,6 +331,39 @@ pub enum RecordingTask {
         /// New recording; it must not exist yet
         out: PathBuf,
     },
+}
+
+/// Tasks with the sessions that were kept.
+#[derive(Clone, Debug, Subcommand)]
+pub enum SessionsTask {
+    /// Print a table: date, person, program, case, lesson, result, agreement with the plan, plunge
+    List(Wanted),
+    /// Write one row per session, with every score, for a spreadsheet or R
+    Export {
+        /// New file
+        #[arg(long, value_name = "FILE.csv")]
+        csv: PathBuf,
+        /// Which sessions
+        #[command(flatten)]
+        wanted: Wanted,
+    },
+}
+
+/// Which sessions are wanted; replays and watched sessions are left out.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Wanted {
+    /// Folders to search [default: those of the start page, and trepan-out]
+    #[arg(value_name = "FOLDER")]
+    pub folders: Vec<PathBuf>,
+    /// Only of this person
+    #[arg(long, value_name = "NAME")]
+    pub person: Option<String>,
+    /// Only of this lesson, by name or title
+    #[arg(long, value_name = "NAME")]
+    pub lesson: Option<String>,
+    /// Only of cases whose name contains this
+    #[arg(long, value_name = "NAME")]
+    pub case: Option<String>,
 }
 
 /// Tasks with devices.

@@ -18,9 +18,19 @@ pub(crate) fn capital(text: impl AsRef<str>) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
+/// A number with its noun, which takes an s unless the number is 1.
+pub(crate) fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_is_singular() {
+        assert_eq!([0, 1, 2].map(|n| count(n, "session")), ["0 sessions", "1 session", "2 sessions"]);
+    }
 
     #[test]
     fn names_cannot_control_the_terminal() {

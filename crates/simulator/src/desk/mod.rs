@@ -17,7 +17,7 @@ mod language;
 mod pages;
 mod pictures;
 mod results;
-mod settings;
+pub(crate) mod settings;
 mod state;
 
 pub(crate) use job::Done;

@@ -25,8 +25,10 @@ pub(crate) struct Kept {
     pub summary: Value,
 }
 
-/// Largest number of sessions that are read.
+/// Largest number of sessions that the window reads.
 const MOST: usize = 500;
+/// How deep below a folder sessions are looked for: program, batch, session.
+const MOST_DEEP: usize = 3;
 
 impl Kept {
     /// Reads the session in a folder.
@@ -43,25 +45,65 @@ impl Kept {
         Self { folder: folder.into(), title, program, case, device, person, lesson, summary }
     }
 
-    /// Lists the sessions in the folders of programs below these folders, the newest first.
+    /// Lists the newest sessions in or below these folders, the newest first.
     pub fn list(roots: &[PathBuf]) -> Vec<Self> {
-        let below = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-        let mut folders: Vec<PathBuf> =
-            roots.iter().flat_map(|root| below(root)).flat_map(|program| below(&program)).collect();
-        folders.sort_by_key(|folder| std::cmp::Reverse(folder.file_name().map(std::ffi::OsStr::to_os_string)));
-        folders.iter().take(MOST).filter_map(|folder| Self::of(folder)).collect()
+        folders(roots).iter().take(MOST).filter_map(|folder| Self::of(folder)).collect()
+    }
+
+    /// Lists all sessions in or below these folders, the newest first.
+    pub fn all(roots: &[PathBuf]) -> Vec<Self> {
+        folders(roots).iter().filter_map(|folder| Self::of(folder)).collect()
+    }
+
+    /// When the session began, UTC as in RFC 3339; of older sessions from the folder's name, empty
+    /// if that holds none.
+    pub fn date(&self) -> String {
+        let of_folder = || {
+            let (date, time) = (self.title.get(..10)?, self.title.get(11..19)?);
+            let is_date = |text: &str, digits: usize| text.chars().filter(char::is_ascii_digit).count() == digits;
+            let whole = self.title.get(10..11) == Some("T") && is_date(date, 8) && is_date(time, 6);
+            whole.then(|| format!("{date}T{}Z", time.replace('-', ":")))
+        };
+        let written = self.summary["date"].as_str().map(String::from);
+        written.or_else(of_folder).unwrap_or_default()
+    }
+
+    /// Whether it repeats or shows another session: a replay or a watcher's.
+    pub fn is_copy(&self) -> bool {
+        ["replay", "watch"].contains(&self.device.as_str())
     }
 
     /// Whether another session is of the same person, and of the same lesson or program.
     fn is_like(&self, other: &Self) -> bool {
         let of = |kept: &Self| (kept.person.trim().to_lowercase(), kept.lesson.clone(), kept.program.clone());
-        !self.person.trim().is_empty() && self.device != "replay" && other.device != "replay" && of(self) == of(other)
+        !self.person.trim().is_empty() && !self.is_copy() && !other.is_copy() && of(self) == of(other)
     }
 
     /// The sessions of the same person with the same lesson or program that began before this one,
     /// the newest first. Sessions are ordered by the names of their folders.
     pub fn before(&self, all: &[Self]) -> Vec<Self> {
         all.iter().filter(|other| other.title < self.title && self.is_like(other)).cloned().collect()
+    }
+}
+
+/// Folders of sessions in or below these folders, the newest first by their names; each once.
+fn folders(roots: &[PathBuf]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    roots.iter().for_each(|root| find(root, MOST_DEEP, &mut found));
+    found.sort_by_cached_key(|folder| std::cmp::Reverse(folder.file_name().map(std::ffi::OsStr::to_os_string)));
+    let mut seen = std::collections::HashSet::new();
+    found.retain(|folder| seen.insert(folder.canonicalize().unwrap_or_else(|_| folder.clone())));
+    found
+}
+
+fn find(folder: &Path, deep: usize, found: &mut Vec<PathBuf>) {
+    if folder.join("summary.json").is_file() {
+        found.push(folder.into());
+    } else if deep > 0 {
+        let below = fs::read_dir(folder).into_iter().flatten().flatten();
+        // A link could lead round in a circle.
+        let below = below.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()));
+        below.for_each(|entry| find(&entry.path(), deep - 1, found));
     }
 }
 
@@ -95,5 +137,10 @@ mod tests {
         let before: Vec<_> = all[0].before(&all).into_iter().map(|kept| kept.title).collect();
         assert_eq!(before, ["2026-01-03T00-00-00", "2026-01-01T00-00-00"]);
         assert!(Kept { person: String::new(), ..all[0].clone() }.before(&all).is_empty(), "nobody was named");
+        let same = [home.path().to_path_buf(), home.path().join("integrated/2026-01-02T00-00-00")];
+        assert_eq!((Kept::all(&same).len(), all[0].date().as_str()), (5, "2026-01-05T00:00:00Z"));
+        assert_eq!(Kept::with(Path::new("demo"), Value::Null).date(), "");
+        let copy = Kept { device: "watch".into(), ..all[0].clone() };
+        assert!(copy.before(&all).is_empty());
     }
 }

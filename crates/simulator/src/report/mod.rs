@@ -1,6 +1,7 @@
 //! Output files of a session: summary, scores, report page, drilled skull.
 
 pub(crate) mod chart;
+pub(crate) mod csv;
 pub(crate) mod debrief;
 pub(crate) mod drilled;
 pub(crate) mod kept;
@@ -8,4 +9,5 @@ pub(crate) mod output;
 pub(crate) mod page;
 pub(crate) mod plan_comparison;
 pub(crate) mod regions;
+pub(crate) mod sessions;
 pub(crate) mod summary;
