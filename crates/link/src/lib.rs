@@ -25,7 +25,8 @@ pub mod wire;
 pub use error::LinkError;
 pub use recorder::{MAX_CHUNK_BYTES, MAX_CHUNK_MS, Recorder};
 pub use recording::{
-    Damage, NODE_STEP_MM, Recording, Repaired, SceneChange, SceneRecord, SceneWriter, read_scene, repair,
+    Damage, NODE_STEP_MM, Recording, Repaired, SceneChange, SceneRecord, SceneWriter, Streamed, read_scene, repair,
+    stream,
 };
 
 #[cfg(doctest)]

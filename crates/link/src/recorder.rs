@@ -2,7 +2,8 @@
 //!
 //! # Practice
 //! Each record type has a topic in Trepan's protobuf schemas (`/tick`, `/second`, `/collision`,
-//! `/solver`, `/event`); `/tool` and `/log` use Foxglove's for viewers. Chunks are compressed with
+//! `/solver`, `/event`, `/score`); `/tool` and `/log` use Foxglove's for viewers. The fields of
+//! `/score` are named in the file, as a session has them. Chunks are compressed with
 //! LZ4 and closed after [`MAX_CHUNK_BYTES`] or [`MAX_CHUNK_MS`] of session time, whichever comes
 //! first, then handed to the operating system: a killed process loses the open chunk only. A tick
 //! takes 2 µs and 80 to 250 B, but 5 ms or the disk's latency when a chunk closes. So a recorder
@@ -11,7 +12,7 @@
 //! # Sources
 //! MCAP: <https://mcap.dev/spec>.
 
-use crate::protobuf::{Fields, encode, file_descriptor_set};
+use crate::protobuf::{Fields, encode, encode_numbers, file_descriptor_set, numbers_descriptor_set};
 use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
 use crate::{LinkError, viewer};
 use foxglove::Encode;
@@ -57,7 +58,9 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
 }
 
 /// Number of channels.
-const CHANNELS: usize = 7;
+const CHANNELS: usize = 8;
+/// Name of the message of scores.
+const SCORE: &str = "trepan.Score";
 
 /// Channel ids.
 struct Channels {
@@ -68,6 +71,8 @@ struct Channels {
     tool: u16,
     log: u16,
     second: u16,
+    /// Added with the first scores, whose names it has.
+    score: Option<u16>,
 }
 
 impl Recorder {
@@ -139,6 +144,23 @@ impl<W: Write + Seek> Recorder<W> {
         self.message(self.channels.event, record)
     }
 
+    /// Records the present scores by name. The names of the first call count; later calls give their
+    /// values in the same order.
+    pub fn scores(&mut self, tick: u64, time_ms: f64, scores: &[(String, f64)]) -> Result<(), LinkError> {
+        self.advance(time_ms)?;
+        let channel = match self.channels.score {
+            Some(channel) => channel,
+            None => {
+                let names: Vec<String> = scores.iter().map(|(name, _)| name.clone()).collect();
+                let added = score_channel(&mut self.mcap, &names).map_err(|error| write_error(&self.path, &error))?;
+                *self.channels.score.insert(added)
+            }
+        };
+        self.bytes.clear();
+        encode_numbers(tick, time_ms, scores.iter().map(|(_, value)| *value), &mut self.bytes);
+        self.write(channel)
+    }
+
     /// Closes the open chunk and hands everything to the operating system.
     pub fn flush(&mut self) -> Result<(), LinkError> {
         self.chunk_began_ms = self.newest_ms;
@@ -194,6 +216,7 @@ impl Channels {
             tool: foxglove_channel::<foxglove::messages::FrameTransform, W>(mcap, "/tool")?,
             log: foxglove_channel::<foxglove::messages::Log, W>(mcap, "/log")?,
             second: own_channel::<SecondRecord, W>(mcap, "/second")?,
+            score: None,
         })
     }
 }
@@ -212,6 +235,11 @@ pub(crate) fn options() -> WriteOptions {
 fn own_channel<T: Fields, W: Write + Seek>(mcap: &mut mcap::Writer<W>, topic: &str) -> Result<u16, McapError> {
     let schema = mcap.add_schema(T::NAME, "protobuf", &file_descriptor_set::<T>())?;
     mcap.add_channel(schema, topic, "protobuf", &BTreeMap::new())
+}
+
+fn score_channel<W: Write + Seek>(mcap: &mut mcap::Writer<W>, names: &[String]) -> Result<u16, McapError> {
+    let schema = mcap.add_schema(SCORE, "protobuf", &numbers_descriptor_set(SCORE, names))?;
+    mcap.add_channel(schema, "/score", "protobuf", &BTreeMap::new())
 }
 
 fn foxglove_channel<T: Encode, W: Write + Seek>(mcap: &mut mcap::Writer<W>, topic: &str) -> Result<u16, McapError> {

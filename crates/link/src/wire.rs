@@ -172,8 +172,8 @@ pub struct EventRecord {
     pub tick: u64,
     /// Session time, ms.
     pub time_ms: f64,
-    /// Kind: `phase`, `warning`, `device`, `score`...; `warning` and `error` also set the level in
-    /// viewers.
+    /// Kind: `phase`, `warning`, `device`...; `warning` and `error` also set the level in viewers.
+    /// Older recordings have their scores here, as `score`.
     pub kind: String,
     /// Text for a reader.
     pub text: String,

@@ -1,11 +1,12 @@
 //! Tests recordings: complete, cut at any byte, damaged, and on a full disk.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
+use prost::Message;
 use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use trepan_geometry::{Pose, Quat, Twist, Vec3, Wrench};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
-use trepan_link::{LinkError, Recorder, Recording, Repaired, repair};
+use trepan_link::{LinkError, Recorder, Recording, Repaired, repair, stream};
 
 fn header() -> SessionHeader {
     SessionHeader {
@@ -173,6 +174,63 @@ fn a_cut_at_any_byte_leaves_all_complete_chunks() {
     assert_eq!(last, 900);
     let longest_loss = steps.iter().zip(steps.iter().skip(1)).map(|(a, b)| b - a).max().unwrap();
     assert!(longest_loss <= 201, "{longest_loss} ticks lost at once: {steps:?}");
+}
+
+#[test]
+fn a_stream_reads_the_chunks_of_a_whole_and_of_a_cut_file() {
+    let (folder, bytes) = (tempfile::tempdir().unwrap(), file(900));
+    let path = folder.path().join("session.mcap");
+    for length in (0..bytes.len()).step_by(bytes.len() / 40).chain([bytes.len()]) {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        let (mut ticks, mut largest) = (Vec::new(), 0);
+        let streamed = stream(&path, |part| {
+            assert_eq!(part.header, header());
+            largest = largest.max(part.ticks.len());
+            ticks.extend(part.ticks.iter().map(bits));
+            Ok::<_, LinkError>(())
+        });
+        match (streamed, open(&bytes[..length])) {
+            (Ok(streamed), Ok(recording)) => {
+                assert_eq!(ticks, recording.ticks.iter().map(bits).collect::<Vec<_>>(), "cut at {length}");
+                assert_eq!((streamed.ticks, streamed.missing), (ticks.len() as u64, 0));
+                assert!(largest < 300, "{largest} ticks at once");
+                assert!(streamed.losses().is_some() == streamed.cut_at.is_some());
+                assert!(length < bytes.len() || streamed.losses().is_none());
+            }
+            (Err(one), Err(other)) => {
+                assert_eq!(one.to_string().split(':').nth(1), other.to_string().split(':').nth(1))
+            }
+            (streamed, opened) => panic!("cut at {length}: {streamed:?}, {:?}", opened.map(|all| all.ticks.len())),
+        }
+    }
+}
+
+#[test]
+fn scores_are_numbers_with_names_in_the_file_and_a_replay_ignores_them() {
+    let path = Path::new("session.mcap");
+    let mut file = Cursor::new(Vec::new());
+    let mut recorder = Recorder::to(&mut file, path, &header()).unwrap();
+    recorder.tick(&tick(0)).unwrap();
+    let scores = |at: f64| [("path_mm".to_string(), 1.5 * at), ("smoothness".to_string(), f64::NAN)];
+    recorder.scores(0, 0.0, &scores(0.0)).unwrap();
+    recorder.scores(1000, 1000.0, &scores(2.0)).unwrap();
+    recorder.finish().unwrap();
+    let recording = open(file.get_ref()).unwrap();
+    assert_eq!((recording.ticks.len(), recording.events.len(), recording.losses()), (1, 0, None));
+    let messages: Vec<_> = mcap::MessageStream::new(file.get_ref()).unwrap().map(Result::unwrap).collect();
+    let found: Vec<_> = messages.iter().filter(|message| message.channel.topic == "/score").collect();
+    let schema = found[1].channel.schema.as_ref().unwrap();
+    assert_eq!((found.len(), schema.name.as_str()), (2, "trepan.Score"));
+    let set = prost_types::FileDescriptorSet::decode(&*schema.data).unwrap();
+    let names: Vec<_> = set.file[0].message_type[0].field.iter().map(|field| field.name().to_string()).collect();
+    assert_eq!(names, ["tick", "time_ms", "path_mm", "smoothness"]);
+    // 1: varint 1000; 2, 3, 4: doubles.
+    let mut expected = vec![8, 0xe8, 7];
+    for (key, value) in [(17, 1000.0), (25, 3.0), (33, f64::NAN)] {
+        expected.push(key);
+        expected.extend(f64::to_le_bytes(value));
+    }
+    assert_eq!(&*found[1].data, &expected);
 }
 
 #[test]

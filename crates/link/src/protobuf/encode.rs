@@ -7,6 +7,14 @@ pub(crate) fn encode<T: Fields>(record: &T, out: &mut Vec<u8>) {
     record.clone().visit(out);
 }
 
+/// Appends a message of a tick, a time and doubles, in the order of its
+/// [description](super::numbers_descriptor_set).
+pub(crate) fn encode_numbers(mut tick: u64, mut time_ms: f64, values: impl Iterator<Item = f64>, out: &mut Vec<u8>) {
+    out.field(1, "", Value::Uint64(&mut tick));
+    out.field(2, "", Value::Double(&mut time_ms));
+    values.zip(3..).for_each(|(mut value, number)| out.field(number, "", Value::Double(&mut value)));
+}
+
 impl Visit for Vec<u8> {
     fn field(&mut self, number: u32, _: &'static str, value: Value<'_>) {
         put_varint(self, u64::from(number << 3 | value.wire_type()));

@@ -20,7 +20,8 @@ mod schema;
 
 pub(crate) use decode::decode;
 pub(crate) use encode::encode;
-pub(crate) use schema::file_descriptor_set;
+pub(crate) use encode::encode_numbers;
+pub(crate) use schema::{file_descriptor_set, numbers_descriptor_set};
 
 /// A message that lists its protobuf fields: a record or a part of one.
 pub trait Fields: Default + Clone {

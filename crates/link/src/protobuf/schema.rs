@@ -16,8 +16,27 @@ pub(crate) fn file_descriptor_set<T: Fields>() -> Vec<u8> {
     T::default().visit(&mut describer);
     let Describer { finished: mut message_type, open } = describer;
     message_type.push(open);
+    set_of(T::NAME, message_type)
+}
+
+/// The serialised description of a message of `tick`, `time_ms` and a double for each name.
+pub(crate) fn numbers_descriptor_set(message_name: &str, names: &[String]) -> Vec<u8> {
+    let kinds = [("tick", Type::Uint64), ("time_ms", Type::Double)];
+    let all = kinds.into_iter().chain(names.iter().map(|name| (name.as_str(), Type::Double)));
+    let field = all.zip(1..).map(|((name, kind), number)| FieldDescriptorProto {
+        name: Some(name.to_owned()),
+        number: Some(number),
+        label: Some(Label::Optional.into()),
+        r#type: Some(kind.into()),
+        ..Default::default()
+    });
+    let message = DescriptorProto { field: field.collect(), ..message(message_name) };
+    set_of(message_name, vec![message])
+}
+
+fn set_of(name: &str, message_type: Vec<DescriptorProto>) -> Vec<u8> {
     let file = FileDescriptorProto {
-        name: Some(format!("{}.proto", T::NAME.replace('.', "/"))),
+        name: Some(format!("{}.proto", name.replace('.', "/"))),
         package: Some(PACKAGE.to_owned()),
         message_type,
         syntax: Some("proto3".to_owned()),

@@ -4,7 +4,7 @@ use super::scan::{Cursor, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 /// Largest unpacked chunk that is read; the recorder's have 256 KiB plus one record.
-const MAX_CHUNK_BYTES: u64 = 16 << 20;
+pub(super) const MAX_CHUNK_BYTES: u64 = 16 << 20;
 
 /// Limit of the unpacked size of all chunks in a file of `length` bytes.
 ///

@@ -13,10 +13,12 @@ mod losses;
 mod repair;
 mod scan;
 mod scene;
+mod stream;
 
 pub use losses::Damage;
 pub use repair::{Repaired, repair};
 pub use scene::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter, read_scene};
+pub use stream::{Streamed, stream};
 
 use crate::LinkError;
 use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME, LOSSES_KEY, REPAIR_NAME};
@@ -63,17 +65,13 @@ impl Recording {
         };
         let mut reading = Reading { budget: chunk::budget(bytes.len()), ..Reading::default() };
         let end = reading.walk(body);
+        let header = reading.header(path);
         if let Some(found) =
             reading.foreign.filter(|_| reading.recording.ticks.is_empty() && repair::next_chunk(body).is_none())
         {
             return Err(LinkError::Compression { path: path.to_owned(), found });
         }
-        let Some((format, header)) = reading.header else {
-            return Err(LinkError::NoHeader { path: path.to_owned() });
-        };
-        if format > FORMAT {
-            return Err(LinkError::TooNew { path: path.to_owned(), found: format, known: FORMAT });
-        }
+        let header = header?;
         let damage = Damage::of(bytes, end, reading.recording.ticks.len() as u64);
         Ok(Self { header, damage, indexed: scan::index(bytes).is_some(), ..reading.recording })
     }
@@ -117,6 +115,17 @@ struct Reading {
 }
 
 impl Reading {
+    /// Takes a header that this version reads; an error if there is none.
+    fn header(&self, path: &Path) -> Result<SessionHeader, LinkError> {
+        match &self.header {
+            None => Err(LinkError::NoHeader { path: path.to_owned() }),
+            Some((format, _)) if *format > FORMAT => {
+                Err(LinkError::TooNew { path: path.to_owned(), found: *format, known: FORMAT })
+            }
+            Some((_, header)) => Ok(header.clone()),
+        }
+    }
+
     /// Reads records up to the regular end; `Err` if the bytes end or are invalid before it. Both
     /// contain the byte position.
     fn walk(&mut self, body: &[u8]) -> Result<usize, usize> {
