@@ -99,7 +99,7 @@ fn a_plan_is_printed_for_the_given_case() {
     assert!(text.status.success());
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
     for words in
-        ["this machine: ", "this case: CT voxels of ", "--tets 6000 is given", "next ", "cores", "TOLERANCE NOT MET"]
+        ["this machine: ", "this case: CT voxels of ", "--tets 6000 is given", "next ", "cores", "tolerance not met"]
     {
         assert!(text.contains(words), "{words:?} is not in: {text}");
     }

@@ -32,8 +32,8 @@ fn part<T: fmt::Display>(
     let Choice { what, error, cost, .. } = choice;
     let why = match (choice.in_time, choice.meets_tolerance) {
         (true, true) => "cheapest within the tolerance",
-        (true, false) => "TOLERANCE NOT MET, the most accurate that runs in time",
-        (false, _) => "TOO SLOW even so, the cheapest there is",
+        (true, false) => "tolerance not met, the most accurate that runs in time",
+        (false, _) => "too slow even so, the cheapest there is",
     };
     writeln!(f, "{name}: {what}")?;
     write!(f, "  {why}: error {error:.3} {unit} of {tolerance:.3} allowed")?;

@@ -23,6 +23,18 @@ pub(crate) fn count(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
+/// Lines of cells, each column as wide as its longest cell.
+pub(crate) fn columns<const N: usize>(lines: impl IntoIterator<Item = [String; N]>) -> String {
+    let lines: Vec<[String; N]> = lines.into_iter().collect();
+    let long = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(long);
+    let line = |line: &[String; N]| {
+        let cells: Vec<String> = line.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
+        cells.join("  ").trim_end().to_string() + "\n"
+    };
+    lines.iter().map(line).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,6 +3,7 @@
 use crate::case::Case;
 use crate::case::anchors::Held;
 use crate::case::plan::Plan;
+use crate::case::remark;
 use crate::case::scene::{RestBrain, Scene};
 use crate::error::SessionError;
 use crate::hand::DeviceLimits;
@@ -59,7 +60,7 @@ impl SessionSetup {
         filmed: bool,
     ) -> Result<Self, SessionError> {
         let scene = Scene::new(program, case)?;
-        scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
+        scene.remarks.iter().for_each(|remark| remark::log(remark));
         let copy = |bone: &Arc<BoneVolume>| BoneVolume::new(&bone.snapshot(), bone.isovalue()).map(Arc::new);
         let filmed = scene.bone.as_ref().filter(|_| filmed).map(copy).transpose();
         let mut setup = Self {

@@ -5,12 +5,20 @@
 //! volume names it. Later sources override earlier ones. Labels outside the brain are left out and
 //! counted.
 
+use crate::case::remark::WELL;
 use crate::error::SessionError;
 use glam::DAffine3;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use trepan_soft::Material;
 use trepan_volume::{Grid, Interpolation, Segment, Segmentation, VoxelVolume, resample};
+
+/// A numerical parameter: share of labels in the brain above which nothing is wrong.
+const WELL_SHARE: f64 = 0.98;
+/// A numerical parameter: share of labels in the brain below which they may be another patient's.
+const STRANGE_SHARE: f64 = 0.8;
+/// American spellings of classes.
+const SPELLINGS: [(&str, &str); 3] = [("gray", "grey"), ("tumor", "tumour"), ("soft-tumor", "soft-tumour")];
 
 /// Tissue class of a part of the brain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +70,7 @@ impl TissueClass {
 
     /// Class with a name.
     pub fn named(name: &str) -> Option<Self> {
+        let name = SPELLINGS.iter().find(|(spelling, _)| *spelling == name).map_or(name, |(_, known)| known);
         Self::ALL.into_iter().find(|class| class.name() == name)
     }
 
@@ -251,7 +260,12 @@ impl TissueSource {
                 self.path.display()
             )));
         }
-        Ok(format!("{name}: {ml:.1} ml of the {all_ml:.1} ml that its labels fill lie in the brain"))
+        let lies = format!("{name}: {ml:.1} ml of the {all_ml:.1} ml that its labels fill lie in the brain");
+        Ok(match ml / all_ml {
+            share if share >= WELL_SHARE => lies + WELL,
+            share if share >= STRANGE_SHARE => lies,
+            _ => lies + ": are these the labels of this patient?",
+        })
     }
 }
 
@@ -271,11 +285,11 @@ impl FromStr for TissueSource {
         let known = || TissueClass::ALL[1..].iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
         let remedy = || format!("expected CLASS=PATH or CLASS=PATH:LABEL,LABEL with CLASS one of {}", known());
         let (name, place) = text.split_once('=').ok_or_else(remedy)?;
-        let class = TissueClass::ALL[1..].iter().find(|class| class.name() == name).ok_or_else(remedy)?;
+        let class = TissueClass::named(name).filter(|class| *class != TissueClass::Brain).ok_or_else(remedy)?;
         // A tail with a separator of folders belongs to the path, as after the letter of a drive.
         let split = place.rsplit_once(':').filter(|(_, labels)| !labels.contains(['/', '\\']));
         let (path, labels) = split.filter(|_| !Path::new(place).exists()).unwrap_or((place, ""));
-        let mut source = Self { class: *class, path: path.into(), codes: Vec::new(), names: Vec::new() };
+        let mut source = Self { class, path: path.into(), codes: Vec::new(), names: Vec::new() };
         for label in labels.split(',').map(str::trim).filter(|label| !label.is_empty()) {
             match label.parse() {
                 Ok(code) => source.codes.push(code),
@@ -303,7 +317,7 @@ mod tests {
         assert_eq!((named.codes, named.names), (vec![3], vec!["core".into()]));
         let odd: TissueSource = "grey=c:\\x".parse().unwrap();
         assert_eq!(odd.path, PathBuf::from("c:\\x"));
-        for bad in ["tumor=x", "tumour", "brain=x", "tumour=", "tumour=:4"] {
+        for bad in ["tumur=x", "tumour", "brain=x", "tumour=", "tumour=:4"] {
             assert!(bad.parse::<TissueSource>().unwrap_err().contains("ventricle, tumour"), "{bad}");
         }
     }

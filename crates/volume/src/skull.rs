@@ -109,9 +109,10 @@ impl Islands {
     /// A remark for the user; `None` if nothing was loose.
     pub fn note(&self) -> Option<String> {
         let Self { pieces, mm3, skull_mm3 } = *self;
+        let of = if pieces == 1 { "piece" } else { "pieces" };
         (pieces > 0).then(|| {
             format!(
-                "{pieces} loose pieces of bone were left out, {:.2} cm³ beside a skull of {:.0} cm³ (table, head rest, fragments, bone thinner than a voxel); if a part of the skull is missing, give a lower --isovalue-hu",
+                "{pieces} loose {of} of bone left out, {:.2} cm³ beside a skull of {:.0} cm³ (table, head rest, fragments, bone thinner than a voxel); if a part of the skull is missing, give a lower --isovalue-hu",
                 1e-3 * mm3,
                 1e-3 * skull_mm3
             )
@@ -167,7 +168,7 @@ mod tests {
         ct.data[12] = 40;
         let removed = skull_only(&mut ct, 300);
         assert_eq!(removed, Islands { pieces: 1, mm3: 4.0, skull_mm3: 6.0 });
-        assert!(removed.note().unwrap().starts_with("1 loose pieces"), "{:?}", removed.note());
+        assert!(removed.note().unwrap().starts_with("1 loose piece of"), "{:?}", removed.note());
         assert_eq!(skull_only(&mut ct, 300).note(), None);
         assert!(ct.data[0..6].iter().all(|&v| v == 900) && ct.data[20..24].iter().all(|&v| v == 299));
         assert_eq!(ct.data[12], 40);

@@ -1,5 +1,6 @@
 //! Builds a skull on cubic voxels, a brain mask and tetrahedra from a patient's images.
 
+use crate::case::remark::WELL;
 use crate::case::{Brain, Inputs};
 use crate::error::SessionError;
 use crate::mixture;
@@ -190,11 +191,15 @@ pub(super) fn registered(
 
 /// Remark on a segmented brain.
 fn brain_note(confidence: &BrainConfidence) -> String {
-    let doubt = match confidence.is_doubtful() {
-        true => "; DOUBTFUL: check its border in the slices, or give a label volume with --labels PATH",
-        false => "",
-    };
-    format!("brain found in the MRI: {confidence}{doubt}")
+    match confidence.is_doubtful() {
+        true => format!(
+            "brain found in the MRI: {confidence}; DOUBTFUL: check its border in the slices, or give a label volume \
+             with --labels PATH"
+        ),
+        false => {
+            format!("brain found in the MRI: {:.0} ml, confidence {:.2}{WELL}", confidence.found_ml, confidence.value)
+        }
+    }
 }
 
 /// Reads a label volume as a mask of its nonzero voxels.
@@ -328,9 +333,9 @@ mod tests {
             inside: None,
         };
         let note = brain_note(&sure);
-        assert!(note.contains("1400 ml, confidence 0.90") && !note.contains("--labels"), "{note}");
+        assert!(note.contains("1400 ml, confidence 0.90") && note.ends_with(WELL), "{note}");
         let leaking = BrainConfidence { value: 0.3, border: 0.3, ..sure };
         let note = brain_note(&leaking);
-        assert!(note.contains("DOUBTFUL") && note.contains("--labels PATH"), "{note}");
+        assert!(note.contains("DOUBTFUL") && note.contains("--labels PATH") && !note.ends_with(WELL), "{note}");
     }
 }

@@ -16,6 +16,7 @@ use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
 use crate::case::identity;
 use crate::case::opening::{Inside, Opening, REFERENCE_MM, bone_of, eye};
+use crate::case::remark::WELL;
 use crate::case::space::Space;
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs};
@@ -25,6 +26,7 @@ use crate::measure::bone::Skull;
 use crate::measure::tissue::{Fineness, Shape};
 use crate::measure::{CaseErrors, Sight};
 use crate::models::Facts;
+use crate::printable::count;
 use crate::program::Program;
 use crate::progress::Progress;
 use crate::recipe::Recipe;
@@ -37,7 +39,7 @@ use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_volume::{VoxelVolume, bone_isovalue, leans, overlap, skull_only};
+use trepan_volume::{Islands, VoxelVolume, bone_isovalue, leans, overlap, skull_only};
 
 /// Opens a case: from the cache if it was built before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
@@ -331,6 +333,22 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     Ok(Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
 }
 
+/// A numerical parameter: loose bone over the skull's, up to which it is specks and the table.
+const FEW_LOOSE: f64 = 0.01;
+
+/// Remark on bone that was left out because it is loose.
+fn loose(islands: &Islands) -> Option<String> {
+    let Islands { pieces, mm3, skull_mm3 } = *islands;
+    if pieces == 0 || mm3 >= FEW_LOOSE * skull_mm3 {
+        return islands.note();
+    }
+    let [loose, skull] = [mm3, skull_mm3].map(|mm3| 1e-3 * mm3);
+    Some(format!(
+        "{} of bone left out, {loose:.2} cm³ beside a skull of {skull:.0} cm³{WELL}",
+        count(pieces, "loose piece")
+    ))
+}
+
 fn build(
     program: Program,
     inputs: &Inputs,
@@ -341,7 +359,7 @@ fn build(
     let Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull")?;
     let made = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
-    notes.extend(made.as_ref().and_then(|(_, islands)| islands.note()));
+    notes.extend(made.as_ref().and_then(|(_, islands)| loose(islands)));
     let skull = made.map(|(skull, _)| skull);
     stages.next("planning the opening")?;
     let classes = mask.map(|mask| make_classes((inputs, tissues), &mask, ct_from_mri, &mut notes)).transpose()?;

@@ -10,6 +10,7 @@ pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod opening;
 pub(crate) mod plan;
+pub(crate) mod remark;
 pub(crate) mod scene;
 mod space;
 mod stages;

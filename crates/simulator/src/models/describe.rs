@@ -63,12 +63,13 @@ pub struct PictureSummary {
 }
 
 impl Models {
-    /// Logs one line for each part, and unmet tolerances as warnings.
+    /// Logs one short line for each part, and unmet tolerances as warnings; `plan`, summary and report
+    /// have the reasons.
     pub fn log(&self) {
         let Setup { bone, tissue, picture } = &self.setup;
-        tracing::info!("bone: {bone} ({})", self.why.bone);
-        tracing::info!("tissue: {tissue} ({})", self.why.tissue);
-        tracing::info!("picture: {picture} ({})", self.why.picture);
+        tracing::info!("bone: {bone}");
+        tracing::info!("tissue: {tissue}");
+        tracing::info!("picture: {picture}");
         let differs = self.differing();
         if !differs.is_empty() {
             tracing::info!("ingredients: {}", differs.join(", "));
@@ -108,7 +109,7 @@ impl Models {
         }
         text += &self.describe_ingredients();
         text += &uncertainty::limits();
-        let unmet = self.unmet.iter().map(|text| format!("NOT MET: {text}\n"));
+        let unmet = self.unmet.iter().map(|text| format!("{text}\n"));
         text + &unmet.collect::<String>()
     }
 

@@ -264,9 +264,9 @@ impl ModelRequest {
         let scene = plan.map_or_else(|| self.scene(&Facts::default()), |plan| plan.scene);
         let (bone, tissue) = (plan.and_then(|p| p.bone.as_ref()), plan.and_then(|p| p.tissue.as_ref()));
         let picture = plan.map(|p| &p.picture).filter(|_| wanted.picture);
-        let mut part = |name: &str, words: &[String], reason: Option<(String, bool)>| {
-            if let Some((reason, true)) = &reason {
-                unmet.push(format!("{name}: {reason}"));
+        let mut part = |name: &str, words: &[String], reason: Option<(String, Option<String>)>| {
+            if let Some((_, Some(short))) = &reason {
+                unmet.push(format!("{name}: {short}"));
             }
             let reason = reason.map_or_else(|| rest.clone(), |(reason, _)| reason);
             words.iter().cloned().chain([reason]).collect::<Vec<_>>().join("; ")
@@ -325,18 +325,18 @@ fn view_pixels(picture: [u32; 2]) -> [u32; 2] {
     [width, height]
 }
 
-/// Reason for a choice, and whether it misses the tolerance or real time.
+/// Reason for a choice, and in a short line what it misses: the tolerance or real time.
 fn reason<T: std::fmt::Display>(
     choice: &Choice<T>,
     scene: &Scene,
     (tolerance, unit): (f64, &str),
     measured: bool,
-) -> (String, bool) {
+) -> (String, Option<String>) {
     let Choice { error, force, cost, meets_tolerance, in_time, better, cheaper, .. } = choice;
     let why = match (in_time, meets_tolerance) {
         (true, true) => "the cheapest within the tolerance",
-        (true, false) => "TOLERANCE NOT MET, the most accurate that runs in time",
-        (false, _) => "TOO SLOW, the cheapest there is",
+        (true, false) => "tolerance not met, the most accurate that runs in time",
+        (false, _) => "too slow here, the cheapest there is",
     };
     let by = if measured { "in this case" } else { "in cases like this" };
     let of_force = |force: &TissueForce| {
@@ -352,7 +352,10 @@ fn reason<T: std::fmt::Display>(
             text += &format!("; next {label} {}: {:.3} {unit}, {:.3} cores{late}", n.what, n.error, n.cost);
         }
     }
-    (text, !(*in_time && *meets_tolerance))
+    let of_force = |force: &TissueForce| format!(", force {:.3} N of {:.3} N", force.error_n, force.allowed_n(scene));
+    let of_force = choice.force.as_ref().map(of_force).unwrap_or_default();
+    let missed = !(*in_time && *meets_tolerance);
+    (text, missed.then(|| format!("{why} (error {error:.3} {unit} of {tolerance} {unit}{of_force})")))
 }
 
 #[cfg(test)]
@@ -422,7 +425,8 @@ mod tests {
         let models = request("--force-error-n 0.0001 --displacement-mm 0.0001", None)
             .settle(&FACTS, || false, unmeasured)
             .unwrap();
-        assert!(models.unmet.len() >= 2 && models.unmet[0].contains("TOLERANCE NOT MET"), "{:?}", models.unmet);
+        assert!(models.unmet.len() >= 2 && models.unmet[0].contains("tolerance not met"), "{:?}", models.unmet);
+        assert!(models.unmet.iter().all(|line| line.len() < 120), "{:?}", models.unmet);
         assert!(models.unmet[0].starts_with("bone: ") && models.unmet[1].starts_with("tissue: "));
     }
 
