@@ -11,19 +11,24 @@ use crate::ingredients::table;
 use crate::inspect::inspect;
 use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, SessionsTask, Task, rate};
-use crate::printable::printable;
+use crate::printable::{columns, count, printable};
 use crate::recordings;
-use crate::report::sessions;
 use crate::report::summary::{CutOff, slow};
+use crate::report::{film, sessions, ticks};
+use crate::run::Quantiles;
 use crate::session::{Ended, Place, Session};
 use crate::show::driver;
 use crate::{Inputs, Options, Program, SessionError};
-use clap::Parser;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 use trepan_render::window::display;
+use trepan_volume::dicom::Series;
+
+/// What is logged unless `RUST_LOG` says otherwise. The toolkit of windows warns of settings of the
+/// desktop that do not concern a user.
+const LOGGED: &str = "warn,winit=error,trepan_simulator=info";
 
 /// Runs a program and returns its exit code.
 ///
@@ -37,7 +42,7 @@ use trepan_render::window::display;
 /// `built_in` is the case that is used if no image is given.
 pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     guard_files();
-    let options = match Options::try_parse() {
+    let options = match Options::of_program(program, std::env::args_os()) {
         Ok(options) => options,
         // clap prints control characters of an argument unescaped.
         Err(fault) if std::env::args_os().any(|word| word.to_string_lossy().contains(char::is_control)) => {
@@ -46,7 +51,7 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         }
         Err(fault) => fault.exit(),
     };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,trepan_simulator=info"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
@@ -125,6 +130,8 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
         }),
         Task::Recording(RecordingTask::Check { file }) => recordings::check(program, file),
         Task::Recording(RecordingTask::Repair { file, out }) => recordings::repair_file(file, out),
+        Task::Recording(RecordingTask::Film { folder, out }) => film::make(folder, out),
+        Task::Recording(RecordingTask::Export { file, csv, every_ms }) => ticks::export(file, csv, *every_ms),
         Task::Sessions(SessionsTask::List(wanted)) => sessions::list(wanted),
         Task::Sessions(SessionsTask::Export { csv, wanted }) => sessions::export(wanted, csv),
         Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),
@@ -143,11 +150,35 @@ fn list_series(folder: &Path) -> Result<ExitCode, SessionError> {
         let fault = format!("no DICOM series lies in {}: give a folder of slices", folder.display());
         return Err(SessionError::Usage(fault));
     }
-    println!("the first number is the one that --ct-series and --mri-series take; it counts from 0");
-    for (number, series) in found.iter().enumerate() {
-        println!("{number}: {series}");
-    }
+    println!("--ct-series and --mri-series take the first number");
+    print!("{}", printable(&series_table(&found)));
     Ok(ExitCode::SUCCESS)
+}
+
+/// The series as a PACS lists them, one a line. The thickness is the distance of two slices.
+fn series_table(found: &[Series]) -> String {
+    let heading =
+        ["number", "kind", "description", "slices", "thickness, mm", "pixels", "pixel, mm", "plane", "series"];
+    let row = |(number, series): (usize, &Series)| {
+        let [columns, rows] = series.size;
+        let text = |text: &str| if text.is_empty() { "-".into() } else { text.to_string() };
+        let [pixel, thick] = series.spacing_mm.map_or_else(
+            || ["-".to_string(), "no volume".into()],
+            |[x, y, z]| [format!("{x:.2} x {y:.2}"), format!("{z:.2}")],
+        );
+        [
+            number.to_string(),
+            text(&series.modality),
+            text(&series.description),
+            series.slices.to_string(),
+            thick,
+            format!("{columns} x {rows}"),
+            pixel,
+            series.direction.into(),
+            series.number.map_or("-".into(), |number| number.to_string()),
+        ]
+    };
+    columns([heading.map(String::from)].into_iter().chain(found.iter().enumerate().map(row)))
 }
 
 /// Prints the models planned for a case on this machine.
@@ -167,17 +198,16 @@ fn planned(
 
 fn report(ended: &Ended) -> ExitCode {
     let summary = &ended.summary;
+    let Quantiles { p50, p99, .. } = summary.tick_us;
     println!(
-        "{} ticks at {:.1} Hz (compute p50 {:.1}, p99 {:.1} us; {} late), force up to {:.2} N, {:.1} mm3 of bone removed, {} warnings, {} pictures",
-        summary.ticks,
-        summary.rate_hz,
-        summary.tick_us.p50,
-        summary.tick_us.p99,
-        summary.late_ticks,
-        summary.force_n.max,
+        "{} ticks at {:.1} Hz (compute p50 {p50:.1}, p99 {p99:.1} us; {} late)",
+        summary.ticks, summary.rate_hz, summary.late_ticks
+    );
+    println!(
+        "{:.1} mm3 of bone removed, {}, {}",
         summary.bone_removed_mm3,
-        summary.warnings.len(),
-        summary.frames
+        count(summary.warnings.len(), "warning"),
+        count(summary.frames as usize, "picture")
     );
     if summary.replay.is_none() {
         slow(summary.rate_hz, summary.asked_hz).iter().for_each(|slow| println!("{slow}"));
@@ -185,7 +215,7 @@ fn report(ended: &Ended) -> ExitCode {
     summary.bands.sentences().iter().for_each(|band| println!("{band}"));
     if summary.cut_off.pieces > 0 {
         let CutOff { pieces, largest_mm3 } = summary.cut_off;
-        println!("cut off the skull: {pieces} piece(s) of bone, the largest of {largest_mm3:.0} mm3");
+        println!("cut off the skull: {} of bone, the largest of {largest_mm3:.0} mm3", count(pieces, "piece"));
     }
     if let Some(replay) = &summary.replay {
         println!("replay: {}", replay.describe());
@@ -220,3 +250,31 @@ fn guard_files() {
 
 #[cfg(not(unix))]
 fn guard_files() {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn series_are_listed_with_description_and_thickness() {
+        let thick = Series {
+            modality: "CT".into(),
+            number: Some(4),
+            slices: 36,
+            size: [512, 512],
+            places: 36,
+            spacing_mm: Some([0.488, 0.488, 5.0]),
+            direction: "axial",
+            description: "head bone".into(),
+            ..Series::default()
+        };
+        let scout = Series { spacing_mm: None, slices: 2, description: String::new(), ..thick.clone() };
+        let table = series_table(&[thick, scout]);
+        let lines: Vec<&str> = table.lines().collect();
+        assert!(
+            lines[1].contains("head bone") && lines[1].contains("5.00") && lines[2].contains("no volume"),
+            "{table}"
+        );
+        assert_eq!(lines[0].find("thickness"), lines[1].find("5.00"), "{table}");
+    }
+}

@@ -3,7 +3,7 @@
 //!
 //! # Practice
 //! [`USED`] is compared with the sources by a test: a row that some crate uses and the list lacks
-//! fails it, as does one that nothing uses any more. `--list-constants`, `--help`, the report, the
+//! fails it, as does one that nothing uses any more. `--list-constants`, the report, the
 //! README and the user guide derive from the list; `TREPAN_WRITE=1 cargo test -p trepan-simulator
 //! --lib constants` brings the list, the README and the user guide up to date.
 
@@ -192,8 +192,7 @@ pub(crate) fn table() -> String {
 
 /// Text at the end of `--help`.
 pub(crate) fn help() -> String {
-    let open: Vec<String> = rows().filter(|row| !row.is_calibrated()).map(Row::name).collect();
-    format!("{}; --list-constants prints all with their sources. Uncalibrated: {}.", sentence(), open.join(", "))
+    format!("--set list prints the ingredients of the models; --list-constants the physical constants: {}.", sentence())
 }
 
 #[cfg(test)]

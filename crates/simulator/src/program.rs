@@ -29,6 +29,44 @@ impl Program {
         ["craniotomy", "brain", "integrated"][self as usize]
     }
 
+    /// What the program is for, in a sentence.
+    pub fn purpose(self) -> &'static str {
+        match self {
+            Self::Craniotomy => "Drill and open a skull from a CT, with force feedback; a simulator for training",
+            Self::Brain => "Press a brain of an MRI that deforms, with force feedback; a simulator for training",
+            Self::Integrated => {
+                "Open a skull and press the brain below it, with force feedback; a simulator for training"
+            }
+        }
+    }
+
+    /// Command lines to begin with, without the program's name.
+    pub fn examples(self) -> [&'static str; 5] {
+        match self {
+            Self::Craniotomy => [
+                "--lesson first-operation --person Ada",
+                "--ct head_ct.nii.gz --mri head_t1.nii.gz --flap 30",
+                "--ct ct_folder/ --ct-series 2 --device touch",
+                "--headless --device script:flap --quality draft --out demo",
+                "recording export demo/session.mcap --csv ticks.csv",
+            ],
+            Self::Brain => [
+                "--quality usual",
+                "--mri head_t1.nii.gz --tissue tumour=tumour.nrrd",
+                "--ct head_ct.nii.gz --mri head_t1.nii.gz --register",
+                "--headless --duration 20 --quality draft --out demo",
+                "--device replay:demo/session.mcap",
+            ],
+            Self::Integrated => [
+                "--lesson first-operation --person Ada",
+                "--ct head_ct.nii.gz --mri head_t1.nii.gz --opening 45,30,110",
+                "--case head --device touch",
+                "--headless --duration 20 --quality draft --out demo",
+                "sessions list --person Ada",
+            ],
+        }
+    }
+
     /// Tools of the program, in the order of the phases.
     pub fn tray(self) -> &'static [Tool] {
         match self {

@@ -10,15 +10,17 @@ use crate::hand::{self, DeviceLimits, OpenDevice};
 use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
+use crate::printable::printable;
 use crate::program::Program;
 use crate::progress::Progress;
 use crate::recordings;
 use crate::report::debrief::Debrief;
+use crate::report::drilled::{self, Drilled};
 use crate::report::kept::Kept;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
-use crate::report::summary::{CutOff, Machine, SecondSummary, SolverSummary, Summary, fps};
-use crate::report::{drilled, output};
+use crate::report::summary::{CutOff, Machine, Opening, SecondSummary, SolverSummary, Summary, fps};
+use crate::report::{output, slicer};
 use crate::run::film::{self, Filming};
 use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
@@ -188,7 +190,7 @@ impl Session {
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let header = self.header(&limits, second_limits.as_ref());
+        let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
         let recorder = Recorder::create(&record, &header)?;
         let scene = match self.recording {
             None => Some((self.film(None), SceneWriter::create(&output::scene_of(&record), &header)?)),
@@ -223,6 +225,9 @@ impl Session {
         let around = around.and_then(|(bone, whole)| drilled::on_nodes_around(whole, bone));
         let bone_before = self.setup.bone().zip(whole);
         let summary = Summary {
+            date,
+            length_s: recording.ticks.last().map_or(0.0, |tick| 1e-3 * tick.time_ms),
+            removed_label: drilled.as_ref().map(Drilled::label),
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
             plan: bone_before.and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
             regions: self.setup.regions(&recording),
@@ -233,10 +238,15 @@ impl Session {
         let summary = summary.with(&outcome);
         let debrief = self.debrief(&summary)?;
         output::write(&self.out, &recording, &summary, &outcome, (&debrief, &self.shots(album.shots)))?;
-        if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
-            output::skull(&self.out, &densities, around.as_ref(), bone, self.options.stl)?;
+        slicer::write(&self.out, &self.setup.plan, &recording.ticks)?;
+        if let Some((bone, drilled)) = self.setup.bone().zip(drilled) {
+            output::skull(&self.out, &drilled, around.as_ref(), bone, self.options.stl)?;
         }
         files.keep();
+        // From the start page nobody prints it; with flags the program does, at its end.
+        if self.options.sessions.is_some() {
+            tracing::info!("report: {}", printable(&self.out.join("report.html").display().to_string()));
+        }
         Ok(Ended { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
     }
 
@@ -261,7 +271,7 @@ impl Session {
 
     /// Current skull in the scanner's voxels; in those of the case, with a remark, if the CT is not
     /// available.
-    fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> VoxelVolume<i16> {
+    fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> Drilled {
         let why = match anatomy::scanned(&self.inputs, self.options.patient.ct_series) {
             Some(Ok(ct)) => return drilled::drilled(ct, whole, bone),
             Some(Err(fault)) => format!("the CT cannot be read again: {fault}"),
@@ -410,12 +420,21 @@ impl Session {
         }
     }
 
-    /// Inserts the final colour maps before the session's pictures.
+    /// Inserts sharp pictures of the opening and of faults, and the final colour maps, before the
+    /// session's pictures.
     fn map(&self, album: &mut Album, before: Option<&VoxelVolume<i16>>, recording: &Recording) {
         let Some(painter) = &mut album.painter else { return };
-        let maps = self.setup.maps(painter, before, recording, &self.out.join("frames"));
+        let folder = self.out.join("frames");
+        // In a window the pictures of the session are as coarse as its frame rate wants.
+        let sharp = painter.set_quality(false, 1.0).map_err(SessionError::from).map(|()| {
+            let close = self.setup.close_pictures(painter, recording, &folder);
+            close.into_iter().chain(self.setup.maps(painter, before, recording, &folder)).collect::<Vec<_>>()
+        });
         let of_session = std::mem::take(&mut album.shots);
-        maps.into_iter().for_each(|map| album.add(map));
+        match sharp {
+            Ok(sharp) => sharp.into_iter().for_each(|shot| album.add(shot)),
+            Err(fault) => album.add(Err(fault)),
+        }
         album.shots.extend(of_session);
     }
 
@@ -459,6 +478,9 @@ impl Session {
         let brain = self.setup.scene.brain.as_ref();
         Summary {
             app: self.program.name().into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            hashes: self.case.hashes(),
+            opening: Opening::of(&self.setup.plan),
             case: self.case.name.clone(),
             person: self.options.person.clone(),
             name: self.options.name.clone(),

@@ -91,17 +91,13 @@ impl Bands {
 
     /// Each band in a sentence.
     pub(crate) fn sentences(&self) -> Vec<String> {
-        let from = |row: &Row, what: &str| match row.spread.is_nan() {
-            true => format!("a factor of {:.1} assumed for {what}", row.factor()),
-            false => format!("the spread of {what}, a factor of {:.2}", row.factor()),
-        };
         let force = self.tissue_force_n.map(|Band { value, low, high }| {
-            let from = from(&STIFFNESS, "tissue stiffness");
-            format!("greatest force on the brain {value:.2} N ({low:.2} to {high:.2} from {from})")
+            format!(
+                "The brain was pressed with up to {value:.2} N; as soft or stiff as brains may be, {low:.2} to {high:.2} N."
+            )
         });
         let time = self.drilling_s.map(|Band { value, low, high }| {
-            let from = from(&ENERGY, "the energy of cutting");
-            format!("drilling {value:.1} s ({low:.1} to {high:.1} from {from})")
+            format!("Drilling took {value:.1} s; in bone as soft or hard as bone may be, {low:.0} to {high:.0} s.")
         });
         force.into_iter().chain(time).collect()
     }
@@ -201,8 +197,8 @@ mod tests {
         (scores.peak_tissue_force_n, scores.peak_tissue) = (0.2, [3.0, 1.0]);
         (scores.drilling_s, scores.cutting) = (6.0, [10.0, 5.0]);
         let sentences = Bands::of(&scores, 0.2).sentences();
-        assert!(sentences[0].starts_with("greatest force on the brain 0.20 N (0.1"), "{sentences:?}");
-        assert!(sentences[1].starts_with("drilling 6.0 s ("), "{sentences:?}");
+        assert!(sentences[0].starts_with("The brain was pressed with up to 0.20 N; "), "{sentences:?}");
+        assert!(sentences[1].starts_with("Drilling took 6.0 s; "), "{sentences:?}");
         assert!(beside(0.01, 0.1).starts_with("model error 10 % of the force, constants -"));
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! # Practice
 //! It is made of summaries only, so the report, the result page and a later look at an old session
-//! show the same. Earlier sessions are those of the same person with the same lesson, or the same
-//! program without one.
+//! show the same. Earlier sessions are those of the same person on the same case with the same
+//! lesson, or the same program without one.
 
 use crate::report::kept::Kept;
 use crate::training::{Lesson, Mark};

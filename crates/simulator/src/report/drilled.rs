@@ -17,6 +17,7 @@
 //! Only a box around the removed bone is computed: a second for a large flap. On the nodes a skull
 //! of 1 mm has eight times its voxels.
 
+use crate::report::summary::RemovedLabel;
 use glam::{DVec3, IVec3, USizeVec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -34,18 +35,37 @@ const RAMP_HU: f32 = 500.0;
 /// Margin of bone around what was removed, mm.
 const MARGIN_MM: f64 = 2.0;
 
+/// The drilled skull in the scanner's voxels.
+#[derive(Clone, Debug)]
+pub(crate) struct Drilled {
+    /// Its densities, HU.
+    pub densities: VoxelVolume<i16>,
+    /// 1 where half or more of a voxel of bone, by the isovalue, was removed, else 0.
+    pub removed: VoxelVolume<u8>,
+}
+
+impl Drilled {
+    /// Number and volume of the voxels that are marked as removed.
+    pub fn label(&self) -> RemovedLabel {
+        let voxels = self.removed.data.iter().filter(|label| **label != 0).count();
+        RemovedLabel { voxels, label_mm3: voxels as f64 * self.removed.world_from_voxel.matrix3.determinant().abs() }
+    }
+}
+
 /// Removes from a CT the bone that was removed since `before`.
-pub(crate) fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneVolume) -> VoxelVolume<i16> {
-    let Some((low, high)) = gone_box(before, bone) else { return ct };
+pub(crate) fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Drilled {
+    let mut removed = VoxelVolume::filled(ct.dims, ct.world_from_voxel, 0u8);
+    let Some((low, high)) = gone_box(before, bone) else { return Drilled { densities: ct, removed } };
     let part = Part::of(&ct, low, high);
     let mut shares: Vec<Option<f32>> = part.voxels().map(|voxel| share(&ct, voxel, before, bone)).collect();
     spread(&ct, &part, &mut shares);
     for (voxel, share) in part.voxels().zip(shares) {
         let at = ct.index(voxel.to_array());
-        let hu = f32::from(ct.data[at]);
-        ct.data[at] = (hu + share.unwrap_or(0.0) * (f32::from(AIR_HU) - hu).min(0.0)).round() as i16;
+        let (hu, share) = (f32::from(ct.data[at]), share.unwrap_or(0.0));
+        removed.data[at] = u8::from(share >= 0.5 && ct.data[at] >= bone.isovalue());
+        ct.data[at] = (hu + share * (f32::from(AIR_HU) - hu).min(0.0)).round() as i16;
     }
-    ct
+    Drilled { densities: ct, removed }
 }
 
 /// The bone that is left, HU on the nodes of the cut. The CT between its voxels lies under a ramp
@@ -259,7 +279,8 @@ mod tests {
         for spacing_mm in [0.5, 1.0] {
             let before = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Cubic, AIR_HU);
             let bone = BoneVolume::new(&before, 400).unwrap();
-            assert!(drilled(ct.clone(), &before, &bone) == ct, "nothing went");
+            let nothing = drilled(ct.clone(), &before, &bone);
+            assert!(nothing.densities == ct && nothing.label() == RemovedLabel::default());
             let [nx, ny, nz] = before.dims;
             for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
                 let voxel = IVec3::new(i as i32, j as i32, k as i32);
@@ -268,7 +289,7 @@ mod tests {
                     bone.set_hu(voxel, AIR_HU);
                 }
             }
-            let after = drilled(ct.clone(), &before, &bone);
+            let after = drilled(ct.clone(), &before, &bone).densities;
             assert_eq!((after.dims, after.world_from_voxel), (ct.dims, ct.world_from_voxel));
             let (mut bone_within, mut rim) = (0, 0);
             for (at, (was, is)) in ct.data.iter().zip(&after.data).enumerate() {
@@ -296,7 +317,9 @@ mod tests {
         (0..64).for_each(|n| (0..5).for_each(|z| bone.set_hu(IVec3::new(n % 8, n / 8, z), AIR_HU)));
         let ct = VoxelVolume::isotropic([2; 3], Vec3::splat(-2.0), 4.0, 1000i16);
         let after = drilled(ct, &before, &bone);
-        assert_eq!((after.get([0, 0, 0]), after.get([1, 1, 1])), (Some(AIR_HU), Some(500)));
+        assert_eq!((after.densities.get([0, 0, 0]), after.densities.get([1, 1, 1])), (Some(AIR_HU), Some(500)));
+        assert_eq!((after.removed.get([0, 0, 0]), after.removed.get([1, 1, 1])), (Some(1), Some(0)));
+        assert_eq!(after.label(), RemovedLabel { voxels: 4, label_mm3: 256.0 });
     }
 
     /// A block of 1 mm voxels with a bore of 1.5 mm along x, and the bore's axis.
@@ -320,7 +343,7 @@ mod tests {
     #[test]
     fn a_bore_thinner_than_two_voxels_takes_its_share_of_each() {
         let (before, bone, axis) = bored();
-        let after = drilled(before.clone(), &before, &bone);
+        let after = drilled(before.clone(), &before, &bone).densities;
         let gone = |at: usize| f64::from(1000 - after.data[at]) / 2000.0;
         // Of one layer across the bore.
         let layer = (0..400).map(|n| gone(10 + 20 * n)).sum::<f64>();

@@ -73,13 +73,15 @@ impl Kept {
         ["replay", "watch"].contains(&self.device.as_str())
     }
 
-    /// Whether another session is of the same person, and of the same lesson or program.
+    /// Whether another session is of the same person and case, and of the same lesson or program.
     fn is_like(&self, other: &Self) -> bool {
-        let of = |kept: &Self| (kept.person.trim().to_lowercase(), kept.lesson.clone(), kept.program.clone());
+        let of = |kept: &Self| {
+            (kept.person.trim().to_lowercase(), kept.lesson.clone(), kept.program.clone(), kept.case.clone())
+        };
         !self.person.trim().is_empty() && !self.is_copy() && !other.is_copy() && of(self) == of(other)
     }
 
-    /// The sessions of the same person with the same lesson or program that began before this one,
+    /// The sessions of the same person and case with the same lesson or program that began before it,
     /// the newest first. Sessions are ordered by the names of their folders.
     pub fn before(&self, all: &[Self]) -> Vec<Self> {
         all.iter().filter(|other| other.title < self.title && self.is_like(other)).cloned().collect()
@@ -140,6 +142,8 @@ mod tests {
         let same = [home.path().to_path_buf(), home.path().join("integrated/2026-01-02T00-00-00")];
         assert_eq!((Kept::all(&same).len(), all[0].date().as_str()), (5, "2026-01-05T00:00:00Z"));
         assert_eq!(Kept::with(Path::new("demo"), Value::Null).date(), "");
+        let elsewhere = Kept { case: "another head".into(), ..all[0].clone() };
+        assert!(elsewhere.before(&all).is_empty(), "another patient is another curve");
         let copy = Kept { device: "watch".into(), ..all[0].clone() };
         assert!(copy.before(&all).is_empty());
     }

@@ -3,10 +3,12 @@
 use crate::error::SessionError;
 use crate::program::Program;
 use crate::report::debrief::Debrief;
-use crate::report::drilled;
+use crate::report::drilled::{self, Drilled};
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
+use crate::report::{csv, slicer};
 use crate::run::Outcome;
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs;
@@ -18,7 +20,7 @@ use trepan_mesh::{isosurface, stl};
 use trepan_volume::{BoneVolume, VoxelVolume, write_beside};
 
 /// Files that a session writes into its folder, besides pictures.
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 14] = [
     "summary.json",
     "scores.csv",
     "report.html",
@@ -26,6 +28,12 @@ const NAMES: [&str; 8] = [
     "drilled.nrrd",
     "drilled-fine.nii.gz",
     "drilled.stl",
+    "removed-label.nii.gz",
+    "removed-label.nrrd",
+    slicer::OPENING,
+    slicer::PLAN,
+    slicer::FLAP,
+    slicer::PATH,
     RECORDING,
 ];
 /// Default name of the recording; `--record` gives another.
@@ -47,7 +55,7 @@ pub(crate) fn holds_session(out: &Path) -> bool {
 
 /// Returns a new folder below `ROOT/PROGRAM`, named after the time (UTC) and the session's name.
 pub(crate) fn dated(program: Program, root: Option<&Path>, name: Option<&str>) -> PathBuf {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    let now = seconds_now();
     let place = root.unwrap_or(Path::new("trepan-out")).join(program.name());
     let fit = |c: char| if c.is_alphanumeric() { c } else { '-' };
     let name = name.map(|name| name.trim().chars().map(fit).take(MOST_LETTERS).collect::<String>());
@@ -59,6 +67,21 @@ pub(crate) fn dated(program: Program, root: Option<&Path>, name: Option<&str>) -
         folder = first.with_extension(nth.to_string());
     }
     folder
+}
+
+fn seconds_now() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs()
+}
+
+/// The present date and time, UTC as in RFC 3339.
+pub(crate) fn now() -> String {
+    rfc_3339(seconds_now())
+}
+
+fn rfc_3339(seconds: u64) -> String {
+    let text = date_and_time(seconds);
+    let (date, time) = text.split_once('T').unwrap_or((&text, ""));
+    format!("{date}T{}Z", time.replace('-', ":"))
 }
 
 /// Formats seconds since 1970 as date and time (UTC) for a file name. Days follow Hinnant's
@@ -136,17 +159,18 @@ impl Drop for Files {
     }
 }
 
-/// Writes the densities of the drilled skull, HU. If asked, also those on the nodes around what was
+/// Writes the drilled skull: its densities, HU, and the labels of what was removed. If asked, also those on the nodes around what was
 /// removed, and with `surface` its isosurface as triangles.
 pub(crate) fn skull(
     out: &Path,
-    densities: &VoxelVolume<i16>,
+    drilled: &Drilled,
     around: Option<&VoxelVolume<i16>>,
     bone: &BoneVolume,
     surface: bool,
 ) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
-    for (name, volume) in [("drilled", Some(densities)), ("drilled-fine", around)] {
+    write_beside(out, "removed-label", &drilled.removed).map_err(|fault| failed(&fault))?;
+    for (name, volume) in [("drilled", Some(&drilled.densities)), ("drilled-fine", around)] {
         volume.map_or(Ok(()), |volume| write_beside(out, name, volume).map(drop)).map_err(|fault| failed(&fault))?;
     }
     if surface {
@@ -172,16 +196,33 @@ pub(crate) fn write(
     whole(&out.join("report.html"), page.as_bytes())
 }
 
-/// Formats the scores as CSV lines of name and value; each name ends with its unit.
+/// Formats the scores as CSV lines of name and value; each name is used once and ends with its
+/// unit.
 fn scores(summary: &Summary) -> String {
+    let text = |value: &Option<String>| value.clone().unwrap_or_default();
+    let about = [
+        ("date_utc", summary.date.clone()),
+        ("person", text(&summary.person)),
+        ("program", summary.app.clone()),
+        ("version", summary.version.clone()),
+        ("case", summary.case.clone()),
+        ("lesson", text(&summary.lesson)),
+        ("session_name", text(&summary.name)),
+        ("device", summary.device.clone()),
+        ("length_s", summary.length_s.to_string()),
+    ];
+    let about = about.into_iter().map(|(name, value)| (name.to_string(), value));
+    let hashes = summary.hashes.iter().map(|(name, hash)| (format!("hashes.{name}"), hash.clone()));
+    let about: String = about.chain(hashes).map(|(name, value)| csv::line([name, value])).collect();
     let parts = [
         ("scores", serde_json::to_value(summary.scores)),
         ("plan", serde_json::to_value(summary.plan)),
         ("cut_off", serde_json::to_value(summary.cut_off)),
     ];
-    let mut csv = String::from("name,value\n");
+    let mut csv = format!("name,value\n{about}");
     for (part, value) in parts {
         for (name, value) in value.ok().as_ref().and_then(|value| value.as_object()).into_iter().flatten() {
+            let value = if value.is_null() { String::new() } else { value.to_string() };
             _ = writeln!(csv, "{part}.{name},{value}");
         }
     }
@@ -191,8 +232,12 @@ fn scores(summary: &Summary) -> String {
         _ = writeln!(csv, "regions.{name}.impulse_n_s,{}", region.impulse_n_s);
         _ = writeln!(csv, "regions.{name}.peak_n,{}", region.peak_n);
     }
+    let mut warnings = BTreeMap::<&str, (usize, f64)>::new();
     for raised in &summary.warnings {
-        _ = writeln!(csv, "warnings.{}_s,{}", raised.name, raised.time_s);
+        warnings.entry(&raised.name).or_insert((0, raised.time_s)).0 += 1;
+    }
+    for (name, (count, first_s)) in warnings {
+        _ = writeln!(csv, "warnings.{name}.count,{count}\nwarnings.{name}.first_s,{first_s}");
     }
     csv
 }
@@ -209,6 +254,7 @@ pub(crate) fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::summary::Raised;
 
     #[test]
     fn a_time_gives_a_name_that_sorts() {
@@ -218,6 +264,33 @@ mod tests {
         assert!(dated(Program::Brain, None, None).starts_with("trepan-out/brain"));
         let named = dated(Program::Brain, Some(Path::new("kept")), Some(" second try/..\u{e9} "));
         assert!(named.starts_with("kept/brain") && named.to_str().unwrap().ends_with("-second-try---é"), "{named:?}");
+    }
+
+    #[test]
+    fn a_date_is_that_of_rfc_3339_and_each_score_has_its_own_name() {
+        assert_eq!(rfc_3339(951_827_696), "2000-02-29T12:34:56Z");
+        let raised = |name: &str, time_s| Raised { time_s, name: name.into(), text: String::new() };
+        let summary = Summary {
+            date: rfc_3339(0),
+            person: Some("Lovelace, Ada".into()),
+            hashes: [("ct".to_string(), "00ff".to_string())].into(),
+            warnings: vec![raised("brain-near", 2.5), raised("brain-near", 7.0), raised("bone-thin", 2.0)],
+            ..Summary::default()
+        };
+        let csv = scores(&summary);
+        let names: Vec<_> = csv.lines().map(|line| line.split(',').next().unwrap()).collect();
+        let once: std::collections::HashSet<_> = names.iter().collect();
+        assert_eq!(once.len(), names.len(), "{csv}");
+        for line in [
+            "date_utc,1970-01-01T00:00:00Z",
+            "person,\"Lovelace, Ada\"",
+            "hashes.ct,00ff",
+            "warnings.brain-near.count,2",
+            "warnings.brain-near.first_s,2.5",
+            "scores.log_dimensionless_jerk,",
+        ] {
+            assert!(csv.lines().any(|known| known == line), "{line} in {csv}");
+        }
     }
 
     #[test]

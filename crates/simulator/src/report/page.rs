@@ -8,7 +8,7 @@ use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
 use crate::report::debrief::Debrief;
-use crate::report::summary::Summary;
+use crate::report::summary::{Raised, Summary};
 use crate::run::Outcome;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -60,7 +60,10 @@ pub(crate) fn html(
     let context = json!({
         "title": format!("Trepan {}: {}", summary.app, summary.case),
         "summary": summary,
+        "when": when(summary),
         "debrief": debrief,
+        "limits": debrief.rows.iter().any(|row| row.passed.is_some()),
+        "faults": faults(&summary.warnings),
         "learning": learning(debrief)?,
         "parts": parts(&summary.models),
         "ingredients": KEYS.iter().map(|key| format!("{} {}", key.name, key.value(&summary.models.ingredients))).collect::<Vec<_>>(),
@@ -73,6 +76,38 @@ pub(crate) fn html(
         "tables": tables(summary)?,
     });
     render("report.html", &context)
+}
+
+/// Date and length of a session in words: "2026-03-04 05:06 UTC, 8 min 35 s".
+fn when(summary: &Summary) -> String {
+    let seconds = summary.length_s;
+    let length = match seconds {
+        s if s < 60.0 => format!("{s:.1} s"),
+        s => format!("{} min {} s", s.round() as u64 / 60, s.round() as u64 % 60),
+    };
+    let date = summary.date.get(..16).map(|date| format!("{} UTC, ", date.replace('T', " ")));
+    format!("{}{length}", date.unwrap_or_default())
+}
+
+/// Times of a fault that are listed.
+const TIMES: usize = 6;
+
+/// Lists the warnings by their kind in the order of their first time: text, number, times.
+fn faults(warnings: &[Raised]) -> Vec<serde_json::Value> {
+    let mut kinds: Vec<Vec<&Raised>> = Vec::new();
+    for raised in warnings {
+        match kinds.iter_mut().find(|kind| kind[0].name == raised.name) {
+            Some(kind) => kind.push(raised),
+            None => kinds.push(vec![raised]),
+        }
+    }
+    let fault = |kind: &Vec<&Raised>| {
+        let times: Vec<String> = kind.iter().take(TIMES).map(|raised| format!("{:.1}", raised.time_s)).collect();
+        let more = kind.len().saturating_sub(TIMES);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        json!({ "text": kind[0].text, "count": kind.len(), "times": format!("{} s{more}", times.join(", ")) })
+    };
+    kinds.iter().map(fault).collect()
 }
 
 /// Draws the learning curves: each measure over the number of the session.
@@ -262,6 +297,46 @@ mod tests {
         assert_eq!(lines.len(), 4, "{page}");
         assert!(lines[0].contains("0.01 s: phase") && lines[1].contains("3.00 s: through: the burr came through"));
         assert!(lines[2].contains("3.50 s: teacher: begins") && lines[3].contains("class=\"w\">4.00 s: brain-near"));
+    }
+
+    #[test]
+    fn a_fault_is_one_row_however_often_it_came() {
+        let raised = |name: &str, time_s: f64| Raised { time_s, name: name.into(), text: format!("{name}: so") };
+        let mut warnings: Vec<Raised> = (0..9).map(|n| raised("brain-pressed", f64::from(n))).collect();
+        warnings.insert(1, raised("bone-thin", 0.26));
+        let faults = faults(&warnings);
+        assert_eq!((faults.len(), &faults[1]["times"]), (2, &json!("0.3 s")));
+        assert_eq!(faults[0]["times"], json!("0.0, 1.0, 2.0, 3.0, 4.0, 5.0 s and 3 more"));
+        let summary = |length_s| Summary { length_s, date: "2026-03-04T05:06:07Z".into(), ..Summary::default() };
+        assert_eq!(when(&summary(515.0)), "2026-03-04 05:06 UTC, 8 min 35 s");
+        assert_eq!(when(&Summary { date: String::new(), ..summary(7.25) }), "7.2 s");
+    }
+
+    #[test]
+    fn a_report_begins_with_the_result_and_folds_the_models() {
+        let (summary, outcome) = (Summary::default(), Outcome::default());
+        let row = |passed: Option<bool>| crate::report::debrief::Row {
+            what: "plunge".into(),
+            value: "0.4".into(),
+            limit: passed.map_or(String::new(), |_| "at most 1 mm".into()),
+            passed,
+            earlier: String::new(),
+        };
+        let page = |passed| {
+            let debrief =
+                Debrief { headline: "The skull is open.".into(), rows: vec![row(passed)], ..Debrief::default() };
+            html(&summary, &outcome, &Recording::default(), (&debrief, &[])).unwrap()
+        };
+        let (free, marked) = (page(None), page(Some(true)));
+        assert!(
+            !free.contains("<th>limit</th>") && marked.contains("<th>limit</th>") && marked.contains("<td>yes</td>")
+        );
+        let place = |text: &str| free.find(text).unwrap_or_else(|| panic!("{text} in {free}"));
+        assert!(place("The skull is open.") < place("Warnings") && place("Warnings") < place("<details>"));
+        assert!(
+            place("<details>") < place("Models")
+                && free.matches("<details>").count() == free.matches("</details>").count()
+        );
     }
 
     #[test]

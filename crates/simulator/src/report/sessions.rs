@@ -7,7 +7,7 @@
 use crate::desk::settings::{Recent, Settings, sessions};
 use crate::error::SessionError;
 use crate::options::Wanted;
-use crate::printable::{count, printable};
+use crate::printable::{columns, count, printable};
 use crate::report::csv;
 use crate::report::debrief::Debrief;
 use crate::report::kept::Kept;
@@ -92,18 +92,9 @@ impl SessionRow {
     }
 }
 
-/// A table for the console, each column as wide as its longest cell.
+/// A table for the console.
 fn table(rows: &[SessionRow]) -> String {
-    let lines: Vec<[String; 9]> =
-        [HEADINGS.map(String::from)].into_iter().chain(rows.iter().map(SessionRow::cells)).collect();
-    let long = |text: &String| text.chars().count();
-    let widths: [usize; 9] =
-        std::array::from_fn(|column| lines.iter().map(|line| long(&line[column])).max().unwrap_or(0));
-    let printed = |line: &[String; 9]| {
-        let cells: Vec<String> = line.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
-        cells.join("  ").trim_end().to_string() + "\n"
-    };
-    lines.iter().map(printed).collect()
+    columns([HEADINGS.map(String::from)].into_iter().chain(rows.iter().map(SessionRow::cells)))
 }
 
 impl Wanted {
@@ -199,7 +190,9 @@ fn text(found: &[(Kept, SessionRow)]) -> String {
 fn numbers(summary: &Value) -> BTreeMap<String, String> {
     let of_part = |part: &'static str| {
         let values = summary[part].as_object().into_iter().flatten();
-        values.filter(|(_, value)| value.is_number()).map(move |(key, value)| (format!("{part}.{key}"), value.to_string()))
+        values
+            .filter(|(_, value)| value.is_number())
+            .map(move |(key, value)| (format!("{part}.{key}"), value.to_string()))
     };
     PARTS.into_iter().flat_map(of_part).collect()
 }
@@ -243,7 +236,9 @@ mod tests {
         };
         assert!(takes(None, None, None) && takes(Some(" ada"), Some("through"), Some("1A2B")));
         assert!(takes(None, Some(&row.lesson), None), "by title");
-        assert!(!takes(Some("Bob"), None, None) && !takes(None, Some("flap"), None) && !takes(None, None, Some("head")));
+        assert!(
+            !takes(Some("Bob"), None, None) && !takes(None, Some("flap"), None) && !takes(None, None, Some("head"))
+        );
     }
 
     #[test]

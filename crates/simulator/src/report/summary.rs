@@ -1,5 +1,6 @@
 //! `summary.json`: the results of a session as numbers.
 
+use crate::case::plan::Plan;
 use crate::models::ModelSummary;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
@@ -10,6 +11,7 @@ use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::SecondOutcome;
 use crate::uncertainty::Bands;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fs;
 use trepan_contact::GuardCounters;
 use trepan_volume::Piece;
@@ -19,6 +21,16 @@ use trepan_volume::Piece;
 pub struct Summary {
     /// Name of the program.
     pub app: String,
+    /// Its version.
+    pub version: String,
+    /// When the session began, UTC as in RFC 3339.
+    pub date: String,
+    /// Session time of the last tick, s.
+    pub length_s: f64,
+    /// Hashes of the case and of its images, by name.
+    pub hashes: BTreeMap<String, String>,
+    /// Where the skull was to be opened.
+    pub opening: Opening,
     /// Name of the case, without the patient's name.
     pub case: String,
     /// Who operated; `null` if that was not said.
@@ -53,6 +65,8 @@ pub struct Summary {
     pub force_n: Forces,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
+    /// Voxels of `removed-label.nii.gz`; `null` without bone.
+    pub removed_label: Option<RemovedLabel>,
     /// Pieces of bone cut off the skull, such as a flap, at the end.
     pub cut_off: CutOff,
     /// Warnings raised.
@@ -84,6 +98,39 @@ pub struct Summary {
     pub remarks: Vec<String>,
     /// The machine.
     pub machine: Machine,
+}
+
+/// The planned opening.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Opening {
+    /// Point on the outer table, RAS mm.
+    pub entry_mm: [f32; 3],
+    /// Unit direction into the head.
+    pub inward: [f32; 3],
+    /// Thickness of the bone in that direction, mm.
+    pub bone_mm: f32,
+    /// Radius of the planned hole, mm.
+    pub hole_mm: f32,
+    /// Radius around the entry that holds the planned flap, mm; 0 without one.
+    pub flap_mm: f32,
+}
+
+impl Opening {
+    /// The opening of a plan.
+    pub(crate) fn of(plan: &Plan) -> Self {
+        let Plan { site, hole_mm, flap_mm, .. } = plan;
+        let (entry_mm, inward) = (site.entry.to_array(), site.inward.to_array());
+        Self { entry_mm, inward, bone_mm: site.bone_mm, hole_mm: *hole_mm, flap_mm: *flap_mm }
+    }
+}
+
+/// The label map of the removed bone: voxels of the CT of which half or more is gone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RemovedLabel {
+    /// Number of voxels.
+    pub voxels: usize,
+    /// Their volume, mm³; it differs from that of the bone removed by the voxels of the rim.
+    pub label_mm3: f64,
 }
 
 /// Pictures of the window while something moved.

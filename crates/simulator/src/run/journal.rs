@@ -4,8 +4,8 @@
 //! # Practice
 //! The ring buffers hold 4 s of ticks; records that do not fit are counted and reported. Chunks are
 //! flushed five times a second, so that a killed session loses at most the last 0.2 s. The current
-//! scores are recorded as an event `score` five times a second, for watching sessions and for
-//! viewers of the file. A full disk ends the recording, not the session.
+//! scores are recorded as numbers once a second and at the end, for viewers of the file. A full
+//! disk ends the recording, not the session.
 
 use crate::run::clock::Clock;
 use crate::run::watch::Share;
@@ -21,7 +21,7 @@ const RING: usize = 8192;
 /// Time between two flushes of the file, ms.
 const FLUSH_MS: f64 = 200.0;
 /// Time between two records of the current scores, ms.
-const SCORES_MS: f64 = 200.0;
+const SCORES_MS: f64 = 1000.0;
 /// Time between two reads of the ring buffers.
 const DRAIN: Duration = Duration::from_millis(5);
 
@@ -102,6 +102,8 @@ impl Journal {
         let mut written = Written::default();
         let mut flushed_ms = 0.0;
         let mut scores = ScoreKeeper::default();
+        // The first record names the scores, so that also a cut file has the names.
+        recorder.scores(0, 0.0, &numbers(&scores)).err().into_iter().for_each(|fault| written.end(fault));
         loop {
             let over = self.is_over();
             let drained = self.drain(&mut recorder, &mut share, &mut written, &mut scores);
@@ -119,6 +121,10 @@ impl Journal {
             std::thread::sleep(DRAIN);
         }
         written.dropped = self.dropped();
+        if written.fault.is_none() {
+            let last = recorder.scores(self.newest.0, self.newest.1, &numbers(&scores));
+            last.err().into_iter().for_each(|fault| written.end(fault));
+        }
         recorder.finish().err().into_iter().for_each(|fault| written.end(fault));
         written
     }
@@ -143,10 +149,7 @@ impl Journal {
             share.take_if(|share| share.ticks.send(&record).is_err());
             recorder.tick(&record)?;
             if (before_ms / SCORES_MS).floor() < (record.time_ms / SCORES_MS).floor() {
-                let text = serde_json::to_string(scores).unwrap_or_default();
-                let event = EventRecord { tick: record.tick, time_ms: record.time_ms, kind: "score".into(), text };
-                share.take_if(|share| share.events.send(&event).is_err());
-                recorder.event(&event)?;
+                recorder.scores(record.tick, record.time_ms, &numbers(scores))?;
             }
         }
         while let Some(record) = self.second.receive() {
@@ -208,6 +211,13 @@ impl Journal {
             + self.solver.dropped()
             + self.notices.dropped()
     }
+}
+
+/// Scores by name; NaN for one that is not defined yet.
+fn numbers(scores: &ScoreKeeper) -> Vec<(String, f64)> {
+    let all = serde_json::to_value(scores).unwrap_or_default();
+    let all = all.as_object().into_iter().flatten();
+    all.map(|(name, value)| (name.clone(), value.as_f64().unwrap_or(f64::NAN))).collect()
 }
 
 /// Logs a notice.
