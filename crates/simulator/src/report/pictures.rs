@@ -41,7 +41,8 @@ impl SessionSetup {
             while painter.refine(&frame)? {}
             snap(&painter.image()?, folder, caption)
         };
-        let opening = draw("the opening: from 25 cm, at the end", plain(above));
+        let caption = if shown { "the opening: from 25 cm, at the end" } else { "the brain: from 25 cm, at rest" };
+        let opening = draw(caption, plain(above));
         let mut all = vec![opening];
         for (number, (event, tick)) in faults(recording).into_iter().enumerate() {
             let Some(&tool) = self.program.tray().get(usize::from(tick.tool)) else { continue };
