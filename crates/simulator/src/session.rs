@@ -236,18 +236,31 @@ impl Session {
             ..self.about(&album)
         };
         let summary = summary.with(&outcome);
-        let debrief = self.debrief(&summary)?;
-        output::write(&self.out, &recording, &summary, &outcome, (&debrief, &self.shots(album.shots)))?;
+        self.write(&recording, &summary, &outcome, album.shots, (drilled, around))?;
+        files.keep();
+        Ok(Ended { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
+    }
+
+    /// Writes the files: summary, scores, report, markups, skull.
+    fn write(
+        &self,
+        recording: &Recording,
+        summary: &Summary,
+        outcome: &Outcome,
+        shots: Vec<Shot>,
+        (drilled, around): (Option<Drilled>, Option<VoxelVolume<i16>>),
+    ) -> Result<(), SessionError> {
+        let debrief = self.debrief(summary)?;
+        output::write(&self.out, recording, summary, outcome, (&debrief, &self.shots(shots)))?;
         slicer::write(&self.out, &self.setup.plan, &recording.ticks)?;
         if let Some((bone, drilled)) = self.setup.bone().zip(drilled) {
             output::skull(&self.out, &drilled, around.as_ref(), bone, self.options.stl)?;
         }
-        files.keep();
         // From the start page nobody prints it; with flags the program does, at its end.
         if self.options.sessions.is_some() {
             tracing::info!("report: {}", printable(&self.out.join("report.html").display().to_string()));
         }
-        Ok(Ended { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
+        Ok(())
     }
 
     /// The debriefing, compared with earlier sessions beside this one.
