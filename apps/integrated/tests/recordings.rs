@@ -172,3 +172,32 @@ fn a_recording_of_another_patient_is_refused() {
     let page = fs::read_to_string(out.join("compare.html")).unwrap();
     assert!(compared.status.success() && page.contains("One patient") && !page.contains("different anatomies"));
 }
+
+#[test]
+fn a_session_is_listed_and_exported_with_its_scores_and_markups() {
+    let bench = Bench::new();
+    let live = bench.path("live");
+    let [ticks, class, killed] = ["ticks.csv", "class.csv", "killed.csv"].map(|name| bench.path(name));
+    let text = |path: &Path| path.to_str().unwrap().to_string();
+    let run = |line: &[&str]| integrated(line);
+    let recording = text(&live.join("session.mcap"));
+    let exported = run(&["recording", "export", &recording, "--csv", &text(&ticks)]);
+    assert!(exported.status.success(), "{}", log_of(&exported));
+    let all = Recording::open(&live.join("session.mcap")).unwrap();
+    assert_eq!(fs::read_to_string(&ticks).unwrap().lines().count(), all.ticks.len() + 1);
+    assert!(all.events.iter().all(|event| event.kind != "score"), "scores are numbers, not events");
+    let cut = bench.file("killed.mcap", &bench.whole[..bench.whole.len() * 2 / 3]);
+    let exported = run(&["recording", "export", &text(&cut), "--csv", &text(&killed)]);
+    assert!(exported.status.code() == Some(1) && log_of(&exported).contains("is not whole"), "{}", log_of(&exported));
+    let listed = log_of(&run(&["sessions", "list", &text(&live)]));
+    assert!(listed.contains("integrated") && listed.contains("1 session in"), "{listed}");
+    assert!(run(&["sessions", "export", &text(&live), "--csv", &text(&class)]).status.success());
+    assert_eq!(fs::read_to_string(&class).unwrap().lines().count(), 2);
+    let none = run(&["sessions", "list", &text(&live), "--person", "nobody"]);
+    assert!(none.status.success() && log_of(&none).contains("0 sessions"));
+    for name in ["opening.mrk.json", "plan.mrk.json", "flap-line.mrk.json", "tool-path.mrk.json"] {
+        let markup: Value = serde_json::from_slice(&fs::read(live.join(name)).unwrap()).unwrap();
+        assert!(!markup["markups"][0]["controlPoints"].as_array().unwrap().is_empty(), "{name}");
+    }
+    assert!(live.join("removed-label.nii.gz").is_file());
+}

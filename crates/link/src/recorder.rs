@@ -144,8 +144,8 @@ impl<W: Write + Seek> Recorder<W> {
         self.message(self.channels.event, record)
     }
 
-    /// Records the present scores by name. The names of the first call count; later calls give their
-    /// values in the same order.
+    /// Records the present scores by name. The names of the first call count; later calls give
+    /// their values in the same order.
     pub fn scores(&mut self, tick: u64, time_ms: f64, scores: &[(String, f64)]) -> Result<(), LinkError> {
         self.advance(time_ms)?;
         let channel = match self.channels.score {

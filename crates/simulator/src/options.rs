@@ -348,8 +348,8 @@ pub enum RecordingTask {
         /// New recording; it must not exist yet
         out: PathBuf,
     },
-    /// Make one file of the pictures of a film (key V in the window): an animated PNG, which browsers
-    /// and office programs play
+    /// Make one file of the pictures of a film (key V in the window): an animated PNG, which
+    /// browsers and office programs play
     Film {
         /// Folder of the film, or of its session
         folder: PathBuf,

@@ -80,8 +80,8 @@ pub fn stream<E: From<LinkError>>(
     }
 }
 
-/// Reads the next record: `true` if it is in `record`, `false` if it was too long and passed over,
-/// `None` if the file ends before its end.
+/// Reads the next record. Returns `true` if it is in `record`, `false` if it was too long and
+/// passed over, `None` if the file ends before its end.
 fn read_record(file: &mut BufReader<File>, record: &mut Vec<u8>) -> std::io::Result<Option<bool>> {
     record.clear();
     file.by_ref().take(HEAD_BYTES as u64).read_to_end(record)?;

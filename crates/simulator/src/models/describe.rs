@@ -63,8 +63,8 @@ pub struct PictureSummary {
 }
 
 impl Models {
-    /// Logs one short line for each part, and unmet tolerances as warnings; `plan`, summary and report
-    /// have the reasons.
+    /// Logs one short line for each part, and unmet tolerances as warnings. The reasons stand in
+    /// `plan`, summary and report.
     pub fn log(&self) {
         let Setup { bone, tissue, picture } = &self.setup;
         tracing::info!("bone: {bone}");

@@ -81,7 +81,7 @@ impl Kept {
         !self.person.trim().is_empty() && !self.is_copy() && !other.is_copy() && of(self) == of(other)
     }
 
-    /// The sessions of the same person and case with the same lesson or program that began before it,
+    /// The sessions of the same person and case with the same lesson or program that began before,
     /// the newest first. Sessions are ordered by the names of their folders.
     pub fn before(&self, all: &[Self]) -> Vec<Self> {
         all.iter().filter(|other| other.title < self.title && self.is_like(other)).cloned().collect()

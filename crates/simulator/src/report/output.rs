@@ -159,8 +159,9 @@ impl Drop for Files {
     }
 }
 
-/// Writes the drilled skull: its densities, HU, and the labels of what was removed. If asked, also those on the nodes around what was
-/// removed, and with `surface` its isosurface as triangles.
+/// Writes the drilled skull: its densities, HU, and the labels of what was removed. If asked, also
+/// the densities on the nodes around what was removed, and with `surface` the isosurface as
+/// triangles.
 pub(crate) fn skull(
     out: &Path,
     drilled: &Drilled,
