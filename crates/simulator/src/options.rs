@@ -37,7 +37,7 @@ pub struct Options {
     pub device: Option<String>,
     /// Device of the second hand, which holds an aspirator: script:aspirate, simulated:NAME, or a
     /// device that --list-devices shows
-    #[arg(help_heading = "Haptic devices", long, value_name = "DEVICE", conflicts_with = "watch")]
+    #[arg(help_heading = "Haptic devices", long, value_name = "DEVICE", value_parser = device, conflicts_with = "watch")]
     pub second_device: Option<String>,
     /// Motion of the tool per motion of the hand, for devices with their own workspace; over 1,
     /// walls are softened by the same factor

@@ -20,7 +20,7 @@ use crate::report::kept::Kept;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{CutOff, Machine, Opening, SecondSummary, SolverSummary, Summary, fps};
-use crate::report::{output, slicer};
+use crate::report::{film, output, slicer};
 use crate::run::film::{self, Filming};
 use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
@@ -259,6 +259,11 @@ impl Session {
         // From the start page nobody prints it; with flags the program does, at its end.
         if self.options.sessions.is_some() {
             tracing::info!("report: {}", printable(&self.out.join("report.html").display().to_string()));
+        }
+        let film = self.out.join("window").join(film::LIST);
+        if film.is_file() {
+            let (program, folder) = (self.program.name(), printable(&self.out.display().to_string()));
+            tracing::info!("film: `{program} recording film {folder} film.png` makes one file of it");
         }
         Ok(())
     }

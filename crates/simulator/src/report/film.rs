@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use trepan_render::Image;
 
 /// The list of a film's pictures and their times, beside them.
-const LIST: &str = "film.ffconcat";
+pub(crate) const LIST: &str = "film.ffconcat";
 
 /// Makes an animated PNG of the film in a folder, or in the folder `window` of a session.
 pub(crate) fn make(folder: &Path, out: &Path) -> Result<ExitCode, SessionError> {

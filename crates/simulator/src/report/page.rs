@@ -115,7 +115,7 @@ fn learning(debrief: &Debrief) -> Result<Vec<Chart>, SessionError> {
     let chart = |(name, values): &(String, Vec<f64>)| {
         let points = values.iter().enumerate().map(|(at, value)| (at as f64 + 1.0, *value)).collect();
         let svg = traces(["session", name], &[Curve { name: "sessions", points }])?;
-        Ok(Chart::new(format!("{name}, session by session; the last is this one"), svg))
+        Ok(Chart::new(format!("{name}: sessions of the same lesson and case; the last is this one"), svg))
     };
     debrief.curves.iter().map(chart).collect()
 }

@@ -306,8 +306,8 @@ const FULL_RATE: f64 = 0.995;
 pub(crate) fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
     (rate_hz < FULL_RATE * asked_hz).then(|| {
         format!(
-            "SLOW: {rate_hz:.1} ticks a second instead of {asked_hz:.0}: forces were late, so do not compare forces \
-             and times of this session with others; close other programs, or give a lower --rate-hz"
+            "SLOW: {rate_hz:.1} of {asked_hz:.0} ticks a second, forces came late: do not compare them; close programs, \
+             or lower --rate-hz"
         )
     })
 }

@@ -269,6 +269,14 @@ mod tests {
     }
 
     #[test]
+    fn the_layout_for_foxglove_plots_what_a_recording_has() {
+        let layout = include_str!("../../../link/foxglove-layout.json");
+        let scores = serde_json::to_value(crate::ScoreKeeper::default()).unwrap();
+        let plotted: Vec<&str> = layout.split('"').filter_map(|text| text.strip_prefix("/score.")).collect();
+        assert!(plotted.len() >= 3 && plotted.iter().all(|name| scores.get(name).is_some()), "{plotted:?}");
+    }
+
+    #[test]
     fn a_number_reads_back_in_any_program() {
         let texts = [f64::from(0.1f32), 1e-7, -0.5, f64::NAN, 12.345678901234, 3.0].map(number);
         assert_eq!(texts, ["0.1", "1e-7", "-0.5", "", "12.345678901234", "3"]);
