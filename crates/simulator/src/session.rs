@@ -21,7 +21,7 @@ use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{CutOff, Machine, Opening, SecondSummary, SolverSummary, Summary, fps};
 use crate::report::{film, output, slicer};
-use crate::run::film::{self, Filming};
+use crate::run::film::{self as filmed, Filming};
 use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
@@ -160,7 +160,7 @@ impl Session {
         let painter = graphics.as_mut().map_err(|why| SessionError::Internal(why.to_string()))?.painter.take();
         let Some((painter, stage)) = painter.zip(self.place.window.as_ref()) else { return Ok(()) };
         let (sender, coming) = channel();
-        scene.into_iter().for_each(|record| _ = sender.send(film::Shot::of(record, first)));
+        scene.into_iter().for_each(|record| _ = sender.send(filmed::Shot::of(record, first)));
         drop(sender);
         let until_s = self.options.duration.unwrap_or(f64::INFINITY);
         player::show(first, coming, painter, &self.opened(stage), &recording, until_s, &stop);
