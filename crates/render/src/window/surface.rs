@@ -93,6 +93,18 @@ impl<'a> Surfaces<'a> {
         (2 * heights.len() > RING).then(|| heights[heights.len() / 2])
     }
 
+    /// Height along `up` over `place` of the brain's surface, mm.
+    pub fn brain(&self, place: Vec3, up: Vec3) -> Option<f32> {
+        let (from, reach_mm) = (place + ABOVE_MM * up, ABOVE_MM + BELOW_MM);
+        let hit = (self.cast)(&Ray { from, along: -up, reach_mm, bone: false, brain: true })?;
+        Some(ABOVE_MM - hit.distance_mm)
+    }
+
+    /// Whether bone lies on most of a ring around a line through a place.
+    pub fn is_bone_around(&self, place: Vec3, up: Vec3, radius_mm: f32) -> bool {
+        self.open_share(place + ABOVE_MM * up, up, (radius_mm, ABOVE_MM + BELOW_MM)) < 0.5
+    }
+
     /// Depths of the bone's outer and inner surface below a place in the air, mm; `None` where no
     /// bone begins within `reach_mm`.
     pub fn tables(&self, place: Vec3, up: Vec3, reach_mm: f32) -> Option<[f32; 2]> {

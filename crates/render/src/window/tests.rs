@@ -612,6 +612,7 @@ fn page() -> Page<&'static str> {
         letters: vec![([0.1, 0.5], "R".into())],
         clicked: Some(|_| "clicked"),
         dragged: None,
+        scrolled: None,
     };
     let many = (0..30).map(|n| Item::button(format!("case {n}"), "a case", "case")).collect();
     Page {
@@ -687,8 +688,9 @@ fn no_control_of_a_page_is_cut_off_beside_the_window() {
 fn a_drag_over_a_picture_keeps_every_place_while_the_page_changes() {
     let page = |drags: &Vec<Drag>| {
         let image = Arc::new(Image { width: 2, height: 2, rgba: vec![90; 16] });
-        let (letters, clicked) = (Vec::new(), None);
-        let picture = Picture { name: "head".into(), image, height: 200.0, letters, clicked, dragged: Some(|d| d) };
+        let (letters, clicked, scrolled) = (Vec::new(), None, None);
+        let dragged: Option<fn(Drag) -> Drag> = Some(|d| d);
+        let picture = Picture { name: "head".into(), image, height: 200.0, letters, clicked, dragged, scrolled };
         // Its height grows past the window, so that its parts are laid out another way.
         let notes = (0..40 * drags.len().min(1)).map(|n| Item::Note(format!("note {n}")));
         let column = [Item::Picture(picture)].into_iter().chain(notes).collect();

@@ -11,7 +11,10 @@
 //!   dragged           the hand goes the pointer's way across the shaft, on the surface, or at its
 //!                     depth in a hole; a craniotome keeps its foot under the bone. A cutting tool
 //!                     is slower than the pointer: it follows the way, not the chord
-//! left button up      the tool rises; a craniotome in its cut stays
+//!   the feed ends     a craniotome's foot rides FOOT_MM below the inner table; any other tool stops
+//!                     where it touches the brain, a tool for the brain PRESS_MM deeper. Where no
+//!                     brain is known, a ball stops at the inner table
+//! left button up      the tool rises, a craniotome out of its cut
 //! wheel               up or down by WHEEL_MM
 //! ```
 //!
@@ -53,6 +56,15 @@ const TRAIL: usize = 64;
 const TRAIL_MM: f32 = 0.5;
 /// Depth of the centre of a craniotome's foot below the bone, mm.
 const FOOT_MM: f32 = 0.8;
+/// Radii of the rings around a tool in which the inner table is sought beside its own, mm: up to the
+/// radius of a flap. A numerical parameter.
+const TABLE_MM: [f32; 4] = [0.0, 6.0, 10.0, 16.0];
+/// Way of a tool for the brain from its first touch on, mm: the deepest press of the scripts. It is a
+/// depth, as a mouse does not feel a force that could stop a hand.
+const PRESS_MM: f32 = 6.0;
+/// Height of a ball's centre over the inner table where the feed ends without a brain, in radii: the
+/// hole is then wider than the second of [`WIDE`].
+const END: f32 = 0.5;
 /// Distance at which a craniotome finds a hole, mm.
 const SEAT_MM: f32 = 4.5;
 /// Steps of that search to each side: numerical.
@@ -121,6 +133,8 @@ struct Press {
     at_first: Option<Below>,
     /// How far the bone was opened by this press: the feed stops.
     through: Option<Below>,
+    /// Height of the tip along the shaft at its first touch of the brain, mm.
+    touched: Option<f32>,
 }
 
 /// The pointer's way that the tool has not gone yet.
@@ -261,12 +275,7 @@ impl Guide {
         let tip = around.world_from_tool.translation;
         if !pointer.held || pointer.tilt {
             if self.press.is_some() {
-                (self.goal, self.wait) = (None, 0.0);
-                if inserted {
-                    hand.translation = tip;
-                } else {
-                    self.withdraws = true;
-                }
+                (self.goal, self.wait, self.withdraws) = (None, 0.0, true);
             }
             return None;
         }
@@ -275,8 +284,9 @@ impl Guide {
             self.withdraws = false;
             let under = || self.under(pointer, around).map_or(tip, |(point, _)| seat(around, point, up));
             let trail = Trail::to(if inserted { tip } else { under() });
-            let (at_first, through) = (None, None);
-            return Some(Press { trail, tip, grip: in_plane, still_s: REST_S, landed: inserted, at_first, through });
+            let (at_first, through, touched) = (None, None, None);
+            let (grip, still_s, landed) = (in_plane, REST_S, inserted);
+            return Some(Press { trail, tip, grip, still_s, landed, at_first, through, touched });
         };
         if pointer.left != Vec2::ZERO {
             let moved = in_plane.zip(press.grip).map_or(Vec3::ZERO, |(now, before)| now - before);
@@ -319,7 +329,8 @@ impl Guide {
         if sliding {
             hand.translation = press.trail.go(hand.translation, up, step);
         }
-        let foot = craniotome.then(|| around.surfaces.inner(hand.translation, up, foot_ring(&around.tool))).flatten();
+        let foot = craniotome.then(|| table(around, hand.translation, up)).flatten();
+        let lowest_mm = press.lowest(around, cuts, sliding && gap > -HOLE_MM);
         let step_mm = LANDING_MM_S * around.dt_s;
         let rise = match foot {
             Some(inner) if inserted || gap < -HOLE_MM => (inner - FOOT_MM).clamp(-step_mm, step_mm),
@@ -331,6 +342,7 @@ impl Guide {
         hand.translation += rise * up;
         // Sliding in a cut leads by as much as pushing.
         hand.translation = tip + (hand.translation - tip).clamp_length_max(lead_mm);
+        hand.translation += (lowest_mm - hand.translation.dot(up)).clamp(0.0, step_mm) * up;
     }
 
     /// Whether a craniotome's foot is under the bone.
@@ -341,9 +353,8 @@ impl Guide {
             return false;
         }
         let up = rotation * Vec3::Z;
-        let inner = around.surfaces.inner(tip, up, foot_ring(&around.tool));
-        let outer = around.surfaces.rest(tip, up, foot_ring(&around.tool));
-        inner.is_some_and(|mm| mm > -2.0) && outer.is_some_and(|mm| mm > HOLE_MM)
+        let is_in_hole = || around.surfaces.rest(tip, up, foot_ring(&around.tool)).is_some_and(|mm| mm > HOLE_MM);
+        table(around, tip, up).is_some_and(|mm| mm > 0.0 || mm > -2.0 && is_in_hole())
     }
 
     /// Flies to the goal under the pointer, or rises where there is none.
@@ -407,6 +418,36 @@ impl Press {
             _ => f32::INFINITY,
         }
     }
+
+    /// The lowest height along the shaft to which the hand may feed the tool, mm. `skims`: the tool
+    /// slides over a surface, and touches it anew.
+    fn lowest(&mut self, around: &Around<'_>, cuts: bool, skims: bool) -> f32 {
+        let Tool { cutting_mm, tip_radius_mm, .. } = around.tool;
+        let Pose { translation: tip, rotation, .. } = around.world_from_tool;
+        let up = rotation * Vec3::Z;
+        let (here, craniotome) = (tip.dot(up), cutting_mm > 0.0);
+        let brain = if craniotome { None } else { around.surfaces.brain(tip, up) };
+        if brain.is_some_and(|mm| mm + tip_radius_mm >= 0.0) && (skims || self.touched.is_none()) {
+            self.touched = Some(here);
+        }
+        if let Some(touched) = self.touched {
+            return touched - if cuts { 0.0 } else { PRESS_MM };
+        }
+        let lowest = if craniotome { -FOOT_MM } else { END * tip_radius_mm };
+        match table(around, tip, up) {
+            _ if brain.is_some() => f32::NEG_INFINITY,
+            Some(mm) => here + mm + lowest,
+            // Thick bone has no inner table within reach yet.
+            None if around.surfaces.is_bone_around(tip, up, foot_ring(&around.tool)) => f32::NEG_INFINITY,
+            None => here,
+        }
+    }
+}
+
+/// Height along `up` over a place of the inner table around it, mm; `None` without bone around.
+fn table(around: &Around<'_>, place: Vec3, up: Vec3) -> Option<f32> {
+    let radii = TABLE_MM.map(|mm| mm.max(foot_ring(&around.tool)));
+    radii.into_iter().find_map(|radius_mm| around.surfaces.inner(place, up, radius_mm))
 }
 
 /// Where a craniotome's foot goes in near a place: the middle of the hole there, if there is one.
@@ -419,7 +460,10 @@ fn seat(around: &Around<'_>, place: Vec3, up: Vec3) -> Vec3 {
     let asides = steps.map(|(i, j)| SEAT_MM / SEAT_STEPS as f32 * (i * right + j * front));
     let deep: Vec<Vec3> =
         asides.filter(|aside| rest(place + *aside).is_some_and(|mm| mm < here.min(0.0) - HOLE_MM)).collect();
-    if deep.is_empty() { place } else { place + deep.iter().sum::<Vec3>() / deep.len() as f32 }
+    let middle = deep.iter().sum::<Vec3>() / deep.len().max(1) as f32;
+    // The middle of a bent cut may lie beside it.
+    let nearest = deep.into_iter().min_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle)));
+    place + nearest.unwrap_or(Vec3::ZERO)
 }
 
 /// Height of a pose over the clearance above the surfaces below it, mm.
@@ -443,212 +487,4 @@ fn on_plane(view: &View, at: Vec2, point: Vec3, across: Vec3) -> Option<Vec3> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::surface::tests::slab;
-    use super::super::surface::{Ray, SurfaceHit};
-    use super::*;
-    use crate::Camera;
-
-    /// A hand over the slab, with a tool that goes wherever the hand goes outside bone.
-    struct Bench {
-        guide: Guide,
-        hand: Pose,
-        tip: Pose,
-        tool: Tool,
-        view: View,
-    }
-
-    impl Bench {
-        fn with(tool: Tool) -> Self {
-            let view = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.3, 0.5, 1.0), 200.0).view(1.0);
-            let start = Pose::from_translation(Vec3::new(30.0, 5.0, 40.0));
-            Self { guide: Guide::default(), hand: start, tip: start, tool, view }
-        }
-
-        /// The pointer over a world point for some pictures.
-        fn point(&mut self, at: Vec3, pointer: Pointer, pictures: usize) {
-            for _ in 0..pictures {
-                let now = self.view.project(at).0;
-                let pointer = Pointer { at: Some(now), ..pointer };
-                let around = Around {
-                    surfaces: Surfaces::new(&slab, [true; 2], None),
-                    view: &self.view,
-                    tool: self.tool,
-                    world_from_tool: self.tip,
-                    dt_s: 0.05,
-                    pedal: false,
-                };
-                self.guide.follow(&mut self.hand, &pointer, &around);
-                self.tip = self.hand;
-                // Bone beside the hole stops the tool.
-                if self.tip.translation.truncate().length() > 3.5 {
-                    self.tip.translation.z = self.tip.translation.z.max(self.tool.tip_radius_mm);
-                }
-            }
-        }
-    }
-
-    const MOVES: Pointer = Pointer { moved: 20.0, ..Pointer::NONE };
-    const HOLDS: Pointer = Pointer { held: true, ..Pointer::NONE };
-
-    #[test]
-    fn the_tool_flies_over_what_is_under_the_pointer() {
-        let mut bench = Bench::with(Tool::burr(3.0));
-        bench.point(Vec3::new(-20.0, 8.0, 0.0), MOVES, 60);
-        let at = bench.hand.translation;
-        assert!((at.truncate() - Vec2::new(-20.0, 8.0)).length() < 0.5, "{at}");
-        assert!((at.z - 3.0 - CLEARANCE_MM).abs() < 0.5 && !bench.guide.pedal(), "{at}");
-        bench.hand.translation.z = -3.0;
-        bench.hand.translation.x = 0.0;
-        bench.hand.translation.y = 0.0;
-        bench.tip = bench.hand;
-        bench.point(Vec3::new(-20.0, 8.0, 0.0), MOVES, 1);
-        assert!(bench.hand.translation.truncate().length() < 0.1, "first up, then across");
-    }
-
-    #[test]
-    fn a_held_button_lands_drills_and_pushes_gently_and_lets_the_tool_rise_again() {
-        let mut bench = Bench::with(Tool::burr(3.0));
-        let place = Vec3::new(20.0, 0.0, 0.0);
-        bench.point(place, MOVES, 60);
-        bench.point(place, HOLDS, 5);
-        assert!(bench.guide.pedal());
-        let before = bench.hand.translation.z;
-        bench.guide.feed_mm_s = 0.5;
-        bench.point(place, HOLDS, 4);
-        assert!(before - bench.hand.translation.z < 0.11, "the feed is 0.5 mm/s");
-        bench.point(place, HOLDS, 200);
-        let lead = bench.tip.translation.z - bench.hand.translation.z;
-        assert!((lead - FEED_LEAD_MM).abs() < 0.01, "{lead}");
-        bench.guide.drills = false;
-        assert!(!bench.guide.pedal(), "the switch is off");
-        bench.point(place, Pointer::NONE, 40);
-        assert!((bench.hand.translation.z - 3.0 - CLEARANCE_MM).abs() < 0.5 && !bench.guide.is_pressed());
-    }
-
-    /// Bone of 6 mm with a round hole of a ball's shape, whose deepest point is at a depth.
-    fn drilled(ray: &Ray, deep_mm: f32) -> Option<SurfaceHit> {
-        let floor = |at: Vec3| {
-            let aside = at.truncate().length();
-            let rise = if deep_mm > 3.0 { 0.0 } else { 3.0 - deep_mm };
-            let wide = (9.0 - rise * rise).max(0.0).sqrt();
-            if aside < wide { -(deep_mm - 3.0 + (9.0 - aside * aside).max(0.0).sqrt()) } else { 0.0 }
-        };
-        let is_bone = |at: Vec3| at.z > -6.0 && at.z < floor(at);
-        let mut last = is_bone(ray.from);
-        for n in 1..(ray.reach_mm / 0.05) as usize {
-            let now = is_bone(ray.from + 0.05 * n as f32 * ray.along);
-            if now && !last {
-                return Some(SurfaceHit { distance_mm: 0.05 * n as f32, normal: -ray.along });
-            }
-            last = now;
-        }
-        None
-    }
-
-    #[test]
-    fn a_held_drill_stops_where_the_bone_is_through_and_goes_on_with_a_new_press() {
-        let mut bench = Bench::with(Tool::burr(3.0));
-        bench.hand = Pose::from_translation(3.5 * Vec3::Z);
-        bench.tip = bench.hand;
-        let (mut deep_mm, mut stops) = (0.0f32, Vec::new());
-        for pointer in [HOLDS, Pointer::NONE, HOLDS, Pointer::NONE, HOLDS] {
-            for _ in 0..400 {
-                let cast = |ray: &Ray| drilled(ray, deep_mm);
-                let pointer = Pointer { at: Some(bench.view.project(Vec3::ZERO).0), ..pointer };
-                let around = Around {
-                    surfaces: Surfaces::new(&cast, [true; 2], None),
-                    view: &bench.view,
-                    tool: bench.tool,
-                    world_from_tool: bench.tip,
-                    dt_s: 0.05,
-                    pedal: false,
-                };
-                bench.guide.follow(&mut bench.hand, &pointer, &around);
-                // It yields as fast as it is pushed, all at once where nothing is left.
-                let yields_mm = if !bench.guide.pedal() {
-                    0.0
-                } else {
-                    0.05 * (bench.tip.translation.z - bench.hand.translation.z)
-                };
-                let bottom = if deep_mm - 3.0 > 6.0 { f32::NEG_INFINITY } else { 3.0 - deep_mm - yields_mm };
-                bench.tip.translation = bench.hand.translation.with_z(bench.hand.translation.z.max(bottom));
-                deep_mm = deep_mm.max(3.0 - bench.tip.translation.z);
-            }
-            stops.push((bench.guide.through(), 3.0 - bench.tip.translation.z));
-        }
-        let (said, deep): (Vec<_>, Vec<_>) = stops.into_iter().unzip();
-        assert!(
-            said[0].is_some_and(|text| text.starts_with("through")) && (5.9..6.6).contains(&deep[0]),
-            "{said:?} {deep:?}"
-        );
-        assert!(
-            said[2].is_some_and(|text| text.starts_with("the hole")) && (6.6..9.6).contains(&deep[2]),
-            "{said:?} {deep:?}"
-        );
-        assert!(said[4].is_none() && deep[4] > 12.0 && deep[1] < 0.0, "a third press means it: {said:?} {deep:?}");
-    }
-
-    #[test]
-    fn a_drag_slides_on_the_surface() {
-        let mut bench = Bench::with(Tool::probe(2.0));
-        bench.point(Vec3::new(20.0, 0.0, 0.0), MOVES, 60);
-        bench.point(Vec3::new(20.0, 0.0, 0.0), HOLDS, 20);
-        let drag = Pointer { left: Vec2::ONE, ..HOLDS };
-        for n in 0..40 {
-            bench.point(Vec3::new(20.0 + 0.2 * n as f32, 0.0, 0.0), drag, 1);
-        }
-        let at = bench.tip.translation;
-        assert!(at.x > 26.0 && (at.z - 2.0).abs() < 0.01, "{at}");
-        assert!(bench.hand.translation.z > 2.0 - FEED_LEAD_MM);
-    }
-
-    #[test]
-    fn a_quick_drag_is_followed_on_its_way_by_a_slow_burr() {
-        let mut bench = Bench::with(Tool::burr(3.0));
-        bench.point(Vec3::new(20.0, 0.0, 0.0), MOVES, 60);
-        bench.point(Vec3::new(20.0, 0.0, 0.0), HOLDS, 20);
-        let drag = Pointer { left: Vec2::ONE, ..HOLDS };
-        let corner = (0..20).map(|n| Vec2::new(20.0 + 0.5 * n as f32, 0.0));
-        let corner = corner.chain((0..20).map(|n| Vec2::new(30.0, 0.5 * n as f32)));
-        corner.for_each(|at| bench.point(at.extend(0.0), drag, 1));
-        let mut off = 0.0f32;
-        for _ in 0..120 {
-            bench.point(Vec3::new(30.0, 9.5, 0.0), HOLDS, 1);
-            let at = bench.tip.translation;
-            off = off.max(at.y.abs().min((at.x - 30.0).abs()));
-        }
-        let at = bench.tip.translation;
-        assert!(off < 0.7 && (at.truncate() - Vec2::new(30.0, 9.5)).length() < 0.7, "{off} mm off, ends at {at}");
-    }
-
-    #[test]
-    fn a_craniotome_goes_under_the_bone_and_stays_in_its_cut() {
-        let mut bench = Bench::with(Tool::craniotome());
-        bench.point(Vec3::new(0.0, 0.0, -7.0), MOVES, 80);
-        bench.point(Vec3::new(0.0, 0.0, -7.0), HOLDS, 60);
-        let deep = bench.tip.translation;
-        assert!(deep.z < -5.0 && deep.truncate().length() < 1.0, "{deep}");
-        bench.hand.translation = Vec3::new(2.6, 0.0, -6.8);
-        bench.tip = bench.hand;
-        bench.point(Vec3::ZERO, Pointer::NONE, 3);
-        bench.point(Vec3::new(-30.0, 0.0, 0.0), MOVES, 10);
-        assert!((bench.hand.translation - Vec3::new(2.6, 0.0, -6.8)).length() < 0.1, "{}", bench.hand.translation);
-        bench.guide.withdraws = true;
-        bench.point(Vec3::new(-30.0, 0.0, 0.0), MOVES, 20);
-        assert!(bench.hand.translation.z > 3.0, "{}", bench.hand.translation);
-    }
-
-    #[test]
-    fn the_wheel_moves_finely_and_the_tool_stays_until_the_pointer_leaves() {
-        let mut bench = Bench::with(Tool::burr(3.0));
-        let place = Vec3::new(20.0, 0.0, 0.0);
-        bench.point(place, MOVES, 60);
-        let before = bench.hand.translation;
-        bench.point(place, Pointer { wheel: 3.0 * NOTCH, ..Pointer::NONE }, 1);
-        bench.point(place, Pointer { moved: 1.0, ..Pointer::NONE }, 3);
-        assert!(((before - bench.hand.translation).length() - 3.0 * WHEEL_MM).abs() < 1e-3);
-        bench.point(place, MOVES, 10);
-        assert!((bench.hand.translation - before).length() < 0.6);
-    }
-}
+mod tests;
