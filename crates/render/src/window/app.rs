@@ -146,7 +146,8 @@ impl<S: Session, D: Draws> Window<S, D> {
             match command {
                 Command::Reset => self.hand.camera = self.look.home(self.start.camera, self.start.microscope),
                 Command::FocusTool => self.hand.camera.target = self.tip,
-                Command::Withdraw => self.hand.guide.withdraws = true,
+                // A stroke is undone once the tool is out of its bone.
+                Command::Withdraw | Command::Undo => self.hand.guide.withdraws = true,
                 Command::Picture => self.captures.ask(),
                 Command::Film => self.captures.film(),
                 Command::Help => self.help ^= true,

@@ -125,8 +125,8 @@ fn headline(summary: &Value, rows: &[Row], passed: Option<bool>) -> String {
     let through = summary["scores"]["times_through"].as_u64().unwrap_or(0);
     let brain = match touches {
         0 => "the brain was not touched by a tool for bone".into(),
-        1 => "a tool for bone touched the brain once".into(),
-        n => format!("a tool for bone touched the brain {n} times"),
+        1 => "the drill touched the brain once".into(),
+        n => format!("the drill touched the brain {n} times"),
     };
     let skull = if through > 0 { "The skull is open" } else { "The skull is not open" };
     match passed {

@@ -11,6 +11,8 @@
 //! redo ─→ redoing ──(all bricks)──→ redone
 //! ```
 //!
+//! A request refused for the first hand's tool is repeated while that tool is drawn out.
+//!
 //! # Practice
 //! A tool is tested at its proxy with its tip and shaft, and a margin of one voxel. Meanwhile
 //! nothing cuts, no tool is changed and no flap moves. The largest stroke takes half a second at 1
@@ -22,6 +24,10 @@ use trepan_volume::{BoneVolume, MAX_STROKES};
 
 /// Bricks exchanged in a tick: some 20 us.
 const BRICKS: usize = 8;
+
+/// Ticks in which a request refused for the tool is repeated, and ticks between two tries: 4 s and a
+/// tenth of a second at 1 kHz, the time to draw a tool out. Numerical parameters.
+const WAIT: [u32; 2] = [4000, 100];
 
 /// Data of a stroke besides its bone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,6 +82,8 @@ pub(crate) struct Undo {
     at: State,
     /// Whether undo and redo were pressed in the last tick.
     was_requested: [bool; 2],
+    /// Ticks for which a request refused for the tool is still repeated.
+    waits: u32,
     /// Ring buffer, indexed by the number of the stroke.
     strokes: Vec<Stroke>,
 }
@@ -83,7 +91,7 @@ pub(crate) struct Undo {
 impl Default for Undo {
     /// Allocates all memory.
     fn default() -> Self {
-        Self { at: State::Rest, was_requested: [false; 2], strokes: vec![Stroke::default(); MAX_STROKES] }
+        Self { at: State::Rest, was_requested: [false; 2], waits: 0, strokes: vec![Stroke::default(); MAX_STROKES] }
     }
 }
 
@@ -112,6 +120,7 @@ impl Undo {
         let before = std::mem::replace(&mut self.was_requested, pressed);
         match self.at {
             State::Rest if pressed[0] && !before[0] => {
+                self.waits = 0;
                 let hinders = hinders.or_else(|| self.lacks(bone, flap_away));
                 hinders.map(Answer::Not).or_else(|| self.put_back(bone, tools, 0))
             }
@@ -119,6 +128,7 @@ impl Undo {
                 let hinders = hinders.or(touches).or_else(|| self.lacks_redo(bone, flap_away));
                 hinders.map(Answer::NotAgain).or_else(|| self.redo(bone, 0))
             }
+            State::Rest if self.waits > 0 => self.try_again(bone, hinders, flap_away, tools),
             State::Rest => None,
             State::Redoing(done) => self.redo(bone, done),
             State::Returning(done) => self.put_back(bone, tools, done),
@@ -171,17 +181,40 @@ impl Undo {
         }
         self.at = if end == all { State::Rest } else { State::Returning(end) };
         (end == all).then(|| {
+            self.waits = 0;
             let stroke = *self.newest(bone);
             bone.drop_stroke();
             Answer::Back(stroke)
         })
     }
 
+    /// Repeats a request until the tool is out; another hindrance ends it.
+    fn try_again(
+        &mut self,
+        bone: &BoneVolume,
+        hinders: Option<Hindrance>,
+        flap_away: bool,
+        tools: &[Option<Place>],
+    ) -> Option<Answer> {
+        self.waits -= 1;
+        if hinders.or_else(|| self.lacks(bone, flap_away)).is_some() {
+            self.waits = 0;
+            return None;
+        }
+        let tries = self.waits > 0 && self.waits.is_multiple_of(WAIT[1]);
+        if tries { self.put_back(bone, tools, 0) } else { None }
+    }
+
     fn take_away(&mut self, bone: &BoneVolume, left: usize, why: Hindrance) -> Option<Answer> {
         let end = left.saturating_sub(BRICKS);
         (end..left).for_each(|n| bone.exchange_brick(n));
         self.at = if end == 0 { State::Rest } else { State::Leaving(end, why) };
-        (end == 0).then_some(Answer::Not(why))
+        // A repeated request is refused without a word.
+        let repeated = self.waits > 0;
+        if end == 0 && !repeated && why == Hindrance::Tool {
+            self.waits = WAIT[0];
+        }
+        (end == 0 && !repeated).then_some(Answer::Not(why))
     }
 }
 
@@ -238,6 +271,39 @@ mod tests {
         (0..320).for_each(|x| (0..4).for_each(|z| bone.set_hu(IVec3::new(x, 4, z), AIR_HU)));
         bone.end_stroke();
         (bone, whole)
+    }
+
+    #[test]
+    fn a_refused_request_is_done_once_the_tool_is_out() {
+        let (bone, whole) = trench();
+        let cut = bone.snapshot();
+        let run = |undo: &mut Undo, ticks: usize, tool| {
+            (0..ticks).filter_map(|_| undo.tick(&bone, [false; 2], FREE, false, &[tool])).collect::<Vec<_>>()
+        };
+        let refused = |undo: &mut Undo| (0..9).find_map(|_| undo.tick(&bone, UNDO, FREE, false, &[probe(150.0, 4.0)]));
+        let mut undo = Undo::default();
+        assert_eq!(refused(&mut undo), Some(Answer::Not(Hindrance::Tool)));
+        assert_eq!(run(&mut undo, 1000, probe(150.0, 4.0)), [], "it waits without a word");
+        assert!(bone.snapshot() == cut || undo.runs());
+        assert_eq!(run(&mut undo, 300, None), [Answer::Back(Stroke::default())]);
+        assert!(bone.snapshot() == whole);
+    }
+
+    #[test]
+    fn a_new_stroke_or_time_ends_a_waiting_request() {
+        let (bone, _) = trench();
+        let cut = bone.snapshot();
+        let refused = |undo: &mut Undo| (0..9).find_map(|_| undo.tick(&bone, UNDO, FREE, false, &[probe(150.0, 4.0)]));
+        let mut undo = Undo::default();
+        refused(&mut undo);
+        let pedal = (Some(Hindrance::Pedal), None);
+        undo.tick(&bone, [false; 2], pedal, false, &[]);
+        assert!((0..500).all(|_| undo.tick(&bone, [false; 2], FREE, false, &[]).is_none()) && bone.snapshot() == cut);
+        undo.tick(&bone, [false; 2], FREE, false, &[]);
+        refused(&mut undo);
+        let tool = [probe(150.0, 4.0)];
+        assert!((0..2 * WAIT[0]).all(|_| undo.tick(&bone, [false; 2], FREE, false, &tool).is_none()));
+        assert!((0..500).all(|_| undo.tick(&bone, [false; 2], FREE, false, &[]).is_none()) && bone.snapshot() == cut);
     }
 
     fn probe(x: f32, y: f32) -> Option<Place> {
