@@ -22,8 +22,8 @@ const FIELDS: [&str; 26] = [
     "/solver/dt_ms",
     "/solver/step_us",
     "/solver/real_time_factor",
-    "/force_n/max",
-    "/force_n/max_step",
+    "/hand_force_n/max",
+    "/hand_force_n/max_step",
     "/bone_removed_mm3",
     "/warnings",
     "/scores",
@@ -49,9 +49,10 @@ pub fn check(root: &Path) -> Result<()> {
     }
     let number = |field: &str| summary.pointer(field).and_then(Value::as_f64).unwrap_or(f64::NAN);
     ensure!(number("/bone_removed_mm3") > 0.0, "the operation removed no bone");
-    ensure!(number("/force_n/max") <= 3.3 + 1e-6, "a force over the device's limit: {} N", number("/force_n/max"));
+    let greatest_n = number("/hand_force_n/max");
+    ensure!(greatest_n <= 3.3 + 1e-6, "a force over the device's limit: {greatest_n} N");
     ensure!(number("/ticks") > 0.0, "no tick ran");
-    ensure!(number("/force_n/end") == 0.0, "the force did not end at zero");
+    ensure!(number("/hand_force_n/end") == 0.0, "the force did not end at zero");
     ensure!(number("/solver/max_displacement_mm") > 1.0, "the probe did not move the brain");
     let left = number("/solver/end_displacement_mm");
     ensure!(left < 0.2 * number("/solver/max_displacement_mm"), "the brain did not come back: {left} mm are left");

@@ -44,7 +44,7 @@ fn a_signal_ends_with_no_force_and_a_whole_recording() {
         assert!(recording.losses().is_none() && recording.ticks.len() > 100);
         assert_eq!(recording.ticks.last().unwrap().wrench.force.length(), 0.0, "the force did not end at zero");
         let summary: Value = serde_json::from_slice(&fs::read(out.path().join("summary.json")).unwrap()).unwrap();
-        assert_eq!(summary["force_n"]["end"], 0.0);
+        assert_eq!(summary["hand_force_n"]["end"], 0.0);
     }
 }
 

@@ -34,7 +34,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let scores = stage.scores();
-    println!("{:.0} mm3 of bone removed, force up to {:.2} N", scores.bone_removed_mm3, scores.peak_force_n);
+    println!(
+        "{:.0} mm3 of bone removed, force on the hand up to {:.2} N",
+        scores.bone_removed_mm3, scores.hand_peak_force_n
+    );
     Ok(())
 }
 

@@ -11,6 +11,7 @@
 
 use crate::case::identity::Identity;
 use crate::error::SessionError;
+use crate::hand::{DeviceLimits, FIRST};
 use crate::report::chart::{Chart, Curve, over_time};
 use crate::report::output::whole;
 use crate::report::page::{Event, render};
@@ -72,7 +73,7 @@ fn remarks(sessions: &[Recording; 2]) -> Vec<String> {
 
 /// Computes the scores from a session's ticks.
 fn score_keeper(session: &Recording) -> ScoreKeeper {
-    let mut scores = ScoreKeeper::default();
+    let mut scores = ScoreKeeper::at(DeviceLimits::recorded(Some(session), FIRST).force_scale());
     session.ticks.iter().for_each(|tick| scores.add(tick));
     scores
 }
@@ -152,7 +153,10 @@ mod tests {
         let session = session(1.5, "1");
         let rows = rows(&session);
         let value = |name: &str| rows.iter().find(|(n, _)| n == name).unwrap().1;
-        assert_eq!((value("peak_force_n"), value("warnings"), value("length_s")), (Some(1.5), Some(1.0), Some(1.999)));
+        assert_eq!(
+            (value("hand_peak_force_n"), value("warnings"), value("length_s")),
+            (Some(1.5), Some(1.0), Some(1.999))
+        );
         assert!((value("path_mm").unwrap() - 19.8).abs() < 0.3, "{:?}", value("path_mm"));
     }
 

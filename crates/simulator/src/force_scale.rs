@@ -20,6 +20,12 @@ use trepan_measurements::hands;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceScale(pub f32);
 
+impl Default for ForceScale {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
 impl ForceScale {
     /// Range of `--force-scale`.
     pub const RANGE: [f64; 2] = [0.01, 1.0];
@@ -28,6 +34,12 @@ impl ForceScale {
     /// 1 for a device that gives it.
     pub fn of(greatest_n: f32) -> Self {
         Self((greatest_n / hands::DRILLING_PEAK_GREATEST.f32()).clamp(Self::RANGE[0] as f32, 1.0))
+    }
+
+    /// Force of bone in a tick, N of the task; 0 where the tool touches none.
+    pub fn bone_n(self, tick: &TickRecord) -> f32 {
+        let touches = tick.depth_mm > 0.0;
+        if touches { (tick.wrench.force - tick.tissue_force).length() / self.0 } else { 0.0 }
     }
 
     /// Force of the task in a tick, N, from the force on the hand.
@@ -54,6 +66,8 @@ mod tests {
     fn bone_is_scaled_and_tissue_is_not() {
         let wrench = Wrench { force: 2.2 * Vec3::Z, torque: Vec3::ZERO };
         let tick = TickRecord { wrench, tissue_force: 0.2 * Vec3::Z, ..TickRecord::default() };
+        assert_eq!(ForceScale(0.2).bone_n(&tick), 0.0, "no bone is touched");
+        assert!((ForceScale(0.2).bone_n(&TickRecord { depth_mm: 0.1, ..tick }) - 10.0).abs() < 1e-5);
         assert!(
             (ForceScale(0.2).task_n(&tick) - 10.2).abs() < 1e-5 && (ForceScale(1.0).task_n(&tick) - 2.2).abs() < 1e-6
         );

@@ -107,7 +107,7 @@ impl Session {
         mut place: Place,
     ) -> Result<Self, SessionError> {
         options.check()?;
-        let (lesson, options) = taught(options)?;
+        let (lesson, options) = taught(program, options)?;
         let windowed = place.window.is_some();
         check_outputs(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
@@ -530,11 +530,12 @@ impl Session {
 }
 
 /// Finds the lesson that the options name, and takes its flap and tool.
-fn taught(options: Options) -> Result<(Option<Lesson>, Options), SessionError> {
+fn taught(program: Program, options: Options) -> Result<(Option<Lesson>, Options), SessionError> {
     let Some(name) = &options.lesson else { return Ok((None, options)) };
-    let all = Lesson::all(Lesson::folder().as_deref());
+    let all = Lesson::of(program, Lesson::folder().as_deref());
     let names = || all.iter().map(|lesson| lesson.name.as_str()).collect::<Vec<_>>().join(", ");
-    let unknown = || SessionError::Usage(format!("--lesson {name} is not known: give one of {}", names()));
+    let unknown =
+        || SessionError::Usage(format!("{} has no lesson {name}: --lesson takes {}", program.name(), names()));
     let lesson = all.iter().find(|lesson| lesson.name == *name).cloned().ok_or_else(unknown)?;
     let flap = options.flap.or(Some(lesson.flap_mm));
     Ok((Some(lesson.clone()), Options { flap, first_slot: lesson.slot, ..options }))

@@ -5,6 +5,7 @@
 //! `lessons` beside the settings. Targets of steps are read from the running session, pass marks
 //! from its summary. The limits are a teacher's choice; none is validated against clinical skill.
 
+use crate::program::Program;
 use crate::run::View;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,9 @@ pub(crate) struct Lesson {
     pub title: String,
     /// What is learnt, in a sentence.
     pub about: String,
+    /// Names of the programs that it is for.
+    #[serde(default = "bone_programs")]
+    pub programs: Vec<String>,
     /// Diameter of the planned flap, mm; 0 for a burr hole.
     #[serde(default)]
     pub flap_mm: f32,
@@ -58,6 +62,10 @@ pub(crate) enum Measure {
     BrainMm,
     /// Bone removed, mm³.
     RemovedMm3,
+    /// The planned flap: 0 attached to the skull, 1 cut free, 2 lifted.
+    Flap,
+    /// Longest time so far that the tool rested on tissue, s.
+    HoldS,
     /// Force on the hand, N.
     ForceN,
     /// Place of the tool in the tray.
@@ -82,11 +90,18 @@ pub(crate) struct Mark {
     pub most: Option<f64>,
 }
 
-/// Lessons of the program.
-const OWN: [&str; 3] = [
+/// Programs of a lesson that names none: those with bone.
+fn bone_programs() -> Vec<String> {
+    [Program::Craniotomy, Program::Integrated].map(|program| program.name().into()).into()
+}
+
+/// Lessons of the programs.
+const OWN: [&str; 5] = [
     include_str!("../lessons/1-first-operation.json"),
     include_str!("../lessons/2-straight-through.json"),
     include_str!("../lessons/3-flap.json"),
+    include_str!("../lessons/4-press.json"),
+    include_str!("../lessons/5-retract.json"),
 ];
 
 impl Lesson {
@@ -118,6 +133,15 @@ impl Lesson {
     }
 }
 
+impl Lesson {
+    /// Lists the lessons of a program: own ones and those in a folder.
+    pub fn of(program: Program, folder: Option<&Path>) -> Vec<Self> {
+        let mut all = Self::all(folder);
+        all.retain(|lesson| lesson.programs.iter().any(|name| name == program.name()));
+        all
+    }
+}
+
 impl Step {
     /// Whether a running session has reached the target.
     fn is_reached(&self, view: &View) -> bool {
@@ -126,6 +150,8 @@ impl Step {
             Measure::TissueDepthMm => view.depth_mm[1].into(),
             Measure::BrainMm => view.brain_distance_mm.into(),
             Measure::RemovedMm3 => view.removed_mm3,
+            Measure::Flap => f64::from(view.flap as u8),
+            Measure::HoldS => view.hold_s,
             Measure::ForceN => view.force.length().into(),
             Measure::Slot => view.sample.slot as f64,
             Measure::Never => return false,
@@ -187,7 +213,7 @@ impl Guide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::program::Program;
+    use crate::stages::flap::FlapPlace;
     use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::{Pose, ToolState};
 
@@ -201,6 +227,35 @@ mod tests {
                 lesson.slot < 4 && !lesson.marks.is_empty() && lesson.marks.iter().all(|mark| !mark.limit().is_empty())
             );
         }
+    }
+
+    #[test]
+    fn a_program_has_its_own_lessons_only() {
+        let names = |program| Lesson::of(program, None).into_iter().map(|lesson| lesson.name).collect::<Vec<_>>();
+        assert_eq!(names(Program::Brain), ["press", "retract"]);
+        assert_eq!(names(Program::Craniotomy), ["first-operation", "through", "flap"]);
+        assert_eq!(names(Program::Integrated), names(Program::Craniotomy));
+        for lesson in Lesson::all(None) {
+            let programs = [Program::Craniotomy, Program::Brain, Program::Integrated];
+            let of = programs.into_iter().filter(|program| lesson.programs.iter().any(|name| name == program.name()));
+            assert!(of.clone().count() == lesson.programs.len() && of.clone().count() > 0, "{}", lesson.name);
+            assert!(of.into_iter().all(|program| lesson.slot < program.tray().len()), "{}", lesson.name);
+        }
+    }
+
+    #[test]
+    fn the_flap_is_lifted_once_it_is_free() {
+        let state = ToolState::at(Pose::IDENTITY);
+        let tool = Program::Craniotomy.tray()[3];
+        let sample = ToolSample { tick: 0, state, tool, slot: 3, drilling: false };
+        let mut guide = Guide::new(Lesson::all(None).remove(2));
+        let mut view = View { removed_mm3: 5000.0, ..View::at(sample, 1.0) };
+        let mut text = |view: &View| (0..9).map(|_| guide.follow(view)).last().unwrap_or_default();
+        assert!(text(&view).starts_with("Step 3"), "half a lap is no flap");
+        view.flap = FlapPlace::Free;
+        assert!(text(&view).contains("Lift the flap"));
+        view.flap = FlapPlace::Away;
+        assert!(text(&view).starts_with("Step 5"));
     }
 
     #[test]

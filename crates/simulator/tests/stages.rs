@@ -165,7 +165,7 @@ fn no_bone_is_restored_around_a_tool_of_either_hand() {
     }
     let drilled = bone.snapshot();
     (0..100).for_each(|_| _ = bench.step(at(z + 1.0, 0.0), Status::Fresh, &NO_PATCH));
-    let peak = bench.stage.scores().peak_force_n;
+    let peak = bench.stage.scores().hand_peak_force_n;
     let undo_at = |bench: &mut Bench, z: f32| {
         (0..300).for_each(|_| _ = bench.step(at(z, 0.0), Status::Fresh, &NO_PATCH));
         let undo = ToolState { buttons: Buttons::UNDO, ..at(z, 0.0) };
@@ -176,7 +176,7 @@ fn no_bone_is_restored_around_a_tool_of_either_hand() {
     };
     let refused = undo_at(&mut bench, z + 1.0);
     assert_eq!(refused.what, What::NotUndone(Hindrance::Tool), "the burr lies in the hole");
-    assert!(bone.snapshot() == drilled && bench.stage.scores().peak_force_n == peak);
+    assert!(bone.snapshot() == drilled && bench.stage.scores().hand_peak_force_n == peak);
     let words = refused.words();
     assert!(words.0 == "refused" && words.1.contains("draw it out"), "{words:?}");
     bench.second = Some(at(-3.0, 0.0).world_from_tool);
@@ -377,7 +377,7 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
     assert!((0.02..0.16).contains(&last.tissue_n()), "{} N of 0.15 N", last.tissue_n());
     assert_eq!(bench.raised(Warning::BrainPressed), None);
     let scores = bench.stage.scores();
-    assert!(scores.peak_tissue_force_n < 0.2 && scores.peak_force_n > 1.0, "{scores:?}");
+    assert!(scores.peak_tissue_force_n < 0.2 && scores.hand_peak_force_n > 1.0, "{scores:?}");
     assert!(scores.tissue_impulse_n_s < 0.2 * scores.tissue_s && scores.tissue_s > 1.0, "{scores:?}");
 }
 

@@ -34,8 +34,8 @@ use trepan_geometry::{ToolState, Wrench};
 ///
 /// `aspirate` is for the second hand: its tool approaches beside the burr and rests on the bone.
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
-/// minute.
-pub const NAMES: [&str; 5] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap"];
+/// minute. `press` and `retract` hold the brain aside with the probe and with the spatula.
+pub const NAMES: [&str; 7] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract"];
 
 /// A script could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -206,6 +206,22 @@ mod tests {
     }
 
     #[test]
+    fn a_press_and_a_retraction_hold_the_brain_at_their_depth() {
+        let (site, plan) = (site(), Plan::default());
+        for (name, radius_mm, aside_mm) in
+            [("press", plan.probe_radius_mm, 0.0), ("retract", plan.spatula_radius_mm, plan.retract_mm[1])]
+        {
+            let script = Script::named(name, &site, 20_000.0).unwrap();
+            let deep: Vec<ToolState> =
+                ticks(&script).filter(|t| depth(&site, t) + radius_mm > site.brain_mm + 2.99).collect();
+            let (first, last) = (deep[0].tip(), deep[deep.len() - 1].tip());
+            assert!(deep.len() > 3000 && ((last - first).length() - aside_mm).abs() < 0.2, "{name}: {}", deep.len());
+            let still = deep.iter().filter(|t| t.twist.linear == Vec3::ZERO).count();
+            assert!(still > 3000, "{name}: {still} ms at rest");
+        }
+    }
+
+    #[test]
     fn the_aspirator_stays_beside_the_burr_and_presses_no_button() {
         let (site, plan) = (site(), Plan::default());
         let burr = Script::named("craniotomy", &site, 20_000.0).unwrap();
@@ -277,7 +293,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn motion_is_continuous_and_velocity_is_its_derivative(name in 0usize..5, duration_ms in 50.0f64..60_000.0, at in 0.0f64..1.0) {
+        fn motion_is_continuous_and_velocity_is_its_derivative(name in 0..NAMES.len(), duration_ms in 50.0f64..60_000.0, at in 0.0f64..1.0) {
             let script = Script::named(NAMES[name], &site(), duration_ms).unwrap();
             let (t, h) = (at * duration_ms, duration_ms * 1e-4);
             let (a, b) = (script.at(t), script.at(t + h));

@@ -84,6 +84,10 @@ pub struct Plan {
     pub aspirator_radius_mm: f32,
     /// How deep each press of the probe goes into the brain, mm.
     pub presses_mm: [f32; 3],
+    /// Radius of the spatula's end, mm.
+    pub spatula_radius_mm: f32,
+    /// How deep the spatula goes into the brain, and how far it then draws it aside, mm.
+    pub retract_mm: [f32; 2],
     /// Closed outline of the flap that the craniotome follows; empty for a circle of 10 mm on flat
     /// bone.
     pub outline: Vec<Rim>,
@@ -104,6 +108,8 @@ impl Default for Plan {
             burr_overlap_mm: 0.8,
             aspirator_radius_mm: 1.5,
             presses_mm: [4.0, 5.0, 6.0],
+            spatula_radius_mm: 3.0,
+            retract_mm: [3.0, 4.0],
             outline: Vec::new(),
             foot_mm: 0.8,
         }
@@ -144,6 +150,8 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
         }
         "craniotomy" => (start, upright, craniotomy(site, plan)),
         "probe" => (start, upright, probe(site, plan)),
+        "press" => (start, upright, press(site, plan)),
+        "retract" => (start, upright, retract(site, plan)),
         _ => {
             let moves = [craniotomy(site, plan), change(site, plan), probe(site, plan)];
             (start, upright, moves.into_iter().flatten().collect())
@@ -262,6 +270,35 @@ fn probe(site: &Site, plan: &Plan) -> Vec<Move> {
     }
     moves.push(Move("leave", 8.0, site.below(-plan.away_mm), HANDS_OFF));
     moves
+}
+
+/// One press of the probe, held for a third of the time.
+fn press(site: &Site, plan: &Plan) -> Vec<Move> {
+    let over_mm = site.brain_mm - plan.probe_radius_mm;
+    let (over, deep) = (site.below(over_mm - 1.0), site.below(over_mm + plan.presses_mm[0]));
+    vec![
+        Move("approach with the probe", 7.0, over, HANDS_OFF),
+        Move("press", 6.0, deep, HANDS_OFF),
+        Move("hold", 9.0, deep, HANDS_OFF),
+        Move("withdraw", 4.0, over, HANDS_OFF),
+        Move("leave", 4.0, site.below(-plan.away_mm), HANDS_OFF),
+    ]
+}
+
+/// The spatula presses, draws the brain aside and holds it there.
+fn retract(site: &Site, plan: &Plan) -> Vec<Move> {
+    let over_mm = site.brain_mm - plan.spatula_radius_mm;
+    let aside = plan.retract_mm[1] * site.inward.any_orthonormal_vector();
+    let (over, deep) = (site.below(over_mm - 1.0), site.below(over_mm + plan.retract_mm[0]));
+    vec![
+        Move("take the spatula", 1.5, site.below(-plan.start_mm), Buttons::take(ToolKind::Spatula)),
+        Move("approach with the spatula", 6.0, over, HANDS_OFF),
+        Move("press", 5.0, deep, HANDS_OFF),
+        Move("draw aside", 5.0, deep + aside, HANDS_OFF),
+        Move("hold", 9.0, deep + aside, HANDS_OFF),
+        Move("withdraw", 4.0, over + aside, HANDS_OFF),
+        Move("leave", 4.0, site.below(-plan.away_mm), HANDS_OFF),
+    ]
 }
 
 #[cfg(test)]

@@ -280,6 +280,7 @@ impl Desk {
     }
 }
 
+/// Lessons of all programs, by which sessions are named.
 fn lessons() -> Vec<Lesson> {
     Lesson::all(Lesson::folder().as_deref())
 }
@@ -398,6 +399,11 @@ impl Host for Desk {
 }
 
 impl Desk {
+    /// The lessons of the program.
+    fn lessons(&self) -> Vec<Lesson> {
+        Lesson::of(self.program, Lesson::folder().as_deref())
+    }
+
     /// Does what changes the pictures of a case.
     fn look(&mut self, action: Action) {
         let View::Check(check, fault) = &mut self.view else { return };
@@ -472,11 +478,11 @@ impl Desk {
             }
             Action::Lessons => {
                 let (closed, person) = (self.form.lacks(self.program), &self.form.settings.person);
-                self.view = View::Page(Box::new(results::lessons(&lessons(), &self.kept(), person, closed)));
+                self.view = View::Page(Box::new(results::lessons(&self.lessons(), &self.kept(), person, closed)));
             }
             Action::Lesson(at) => {
                 let options = self.form.options(&self.base, self.program);
-                let lesson = lessons().get(at).map(|lesson| lesson.name.clone());
+                let lesson = self.lessons().get(at).map(|lesson| lesson.name.clone());
                 // The lesson brings its own flap.
                 self.begin(options.map(|options| Options {
                     lesson,

@@ -196,7 +196,7 @@ fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 6], Sessio
 const TIMINGS: &str = "asked_hz rate_hz late_ticks held_ticks tick_us solver.dt_ms solver.step_us solver.collision_us \
                        solver.real_time_factor frames fps moving";
 /// Paths of the scores in a summary.
-const SCORES: &str = "scores bone_removed_mm3 plan cut_off force_n";
+const SCORES: &str = "scores bone_removed_mm3 plan cut_off hand_force_n hand_force_scale";
 
 /// A table of a page.
 #[derive(Serialize)]
@@ -341,8 +341,9 @@ mod tests {
 
     #[test]
     fn a_path_names_its_unit() {
-        let units = ["scores.tissue_impulse_n_s", "tick_us.p50", "scores.bone_removed_mm3", "force_n.max_step"];
+        let units = ["scores.tissue_impulse_n_s", "tick_us.p50", "scores.bone_removed_mm3", "hand_force_n.max_step"];
         assert_eq!(units.map(unit), ["N s", "µs", "mm³", "N"]);
+        assert_eq!(["hand_force_scale", "scores.peak_bone_force_n"].map(unit), ["", "N"]);
         assert_eq!(["scores.idle_s", "scores.tool_changes", "late_ticks"].map(unit), ["s", "", "ticks"]);
         assert_eq!(["fps", "guard.slewed", "second.guard.slewed"].map(unit), ["1/s", "ticks", "ticks"]);
         let rows = rows("scores", &json!({ "scores": { "path_mm": 1.5 } })).unwrap();

@@ -61,8 +61,10 @@ pub struct Summary {
     pub tick_us: Quantiles,
     /// The solver of soft tissue; `null` without.
     pub solver: Option<SolverSummary>,
-    /// Forces on the hand, N.
-    pub force_n: Forces,
+    /// Forces on the hand, N; those of the task are in the scores.
+    pub hand_force_n: HandForces,
+    /// Newtons at the hand per newton of the task, on bone.
+    pub hand_force_scale: f32,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
     /// Voxels of `removed-label.nii.gz`; `null` without bone.
@@ -174,6 +176,21 @@ pub struct CutOff {
 }
 
 impl CutOff {
+    /// Adds the pieces that notices say were lifted and not put back: they are no longer there to be
+    /// found.
+    fn with_lifted(self, notices: &[Notice]) -> Self {
+        let mut lifted: Vec<f64> = Vec::new();
+        for notice in notices {
+            match notice.what {
+                What::FlapLifted(mm3) => lifted.push(mm3.into()),
+                What::FlapReturned => _ = lifted.pop(),
+                _ => {}
+            }
+        }
+        let largest_mm3 = lifted.iter().copied().fold(self.largest_mm3, f64::max);
+        Self { pieces: self.pieces + lifted.len(), largest_mm3 }
+    }
+
     /// Compares the pieces before and now; `voxel_mm3` is the volume of a voxel.
     pub fn of(before: &[Piece], now: &[Piece], voxel_mm3: f32) -> Self {
         let mm3 = |piece: &Piece| piece.voxels as f64 * f64::from(voxel_mm3);
@@ -200,17 +217,13 @@ pub struct SolverSummary {
 
 /// Forces on the hand.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Forces {
+pub struct HandForces {
     /// Largest force, N.
     pub max: f32,
     /// Largest change between two ticks, N.
     pub max_step: f32,
     /// Force after the last tick, N.
     pub end: f32,
-    /// Largest force of bone in newtons of the task.
-    pub task_max: f32,
-    /// Newtons at the hand per newton of the task, on bone.
-    pub scale: f32,
 }
 
 /// Results of the second hand.
@@ -273,14 +286,14 @@ impl Summary {
             held_ticks: outcome.ticks.held,
             tick_us: (&outcome.ticks.times).into(),
             solver: outcome.solver.clone().map(|outcome| SolverSummary { outcome, ..self.solver.unwrap_or_default() }),
-            force_n: Forces {
-                max: outcome.scores.peak_force_n,
-                max_step: outcome.scores.peak_force_step_n,
+            hand_force_n: HandForces {
+                max: outcome.scores.hand_peak_force_n,
+                max_step: outcome.scores.hand_peak_force_step_n,
                 end: outcome.end_force_n,
-                task_max: outcome.scores.peak_bone_force_n / outcome.force_scale.max(1e-3),
-                scale: outcome.force_scale,
             },
+            hand_force_scale: outcome.force_scale,
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
+            cut_off: self.cut_off.with_lifted(&outcome.written.notices),
             warnings: warnings(outcome),
             scores: outcome.scores,
             bands: Bands::of(&outcome.scores, outcome.force_scale),
@@ -366,6 +379,16 @@ mod tests {
             [(10.0, What::Undone(1.0)), (1500.0, What::Through), (1600.0, What::NotOpen), (2500.0, What::Through)];
         outcome.written.notices = notices.map(|(time_ms, what)| notice(time_ms, what)).into();
         assert_eq!(through_s(&outcome), [1.5, 2.5]);
+    }
+
+    #[test]
+    fn a_lifted_flap_counts_as_cut_off_until_it_is_put_back() {
+        let notice = |what| Notice { tick: 1, time_ms: 0.0, what };
+        let other = CutOff { pieces: 1, largest_mm3: 20.0 };
+        let lifted = [What::FlapFree(800.0), What::FlapLifted(800.0)].map(notice);
+        assert_eq!(other.with_lifted(&lifted), CutOff { pieces: 2, largest_mm3: 800.0 });
+        let back = [What::FlapLifted(800.0), What::FlapReturned].map(notice);
+        assert_eq!(other.with_lifted(&back), other);
     }
 
     #[test]

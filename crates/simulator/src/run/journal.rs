@@ -7,6 +7,7 @@
 //! scores are recorded as numbers once a second and at the end, for viewers of the file. A full
 //! disk ends the recording, not the session.
 
+use crate::force_scale::ForceScale;
 use crate::run::clock::Clock;
 use crate::run::watch::Share;
 use crate::stages::notice::{Notice, What};
@@ -48,6 +49,8 @@ pub(crate) struct Journal {
     solver: Receiver<SolverRecord>,
     /// Number and time, ms, of the newest tick.
     newest: (u64, f64),
+    /// Newtons at the hand per newton of the task, on bone.
+    force_scale: ForceScale,
 }
 
 /// Result of the recording thread.
@@ -72,7 +75,7 @@ impl Written {
 }
 
 /// Makes the ring buffers and returns both ends.
-pub(crate) fn journal() -> (JournalSenders, Journal) {
+pub(crate) fn journal(force_scale: ForceScale) -> (JournalSenders, Journal) {
     let (ticks, second, notices) = (bounded(RING), bounded(RING), bounded(RING / 8));
     let (collisions, solver) = (bounded(RING), bounded(RING));
     let newest = (0, 0.0);
@@ -91,6 +94,7 @@ pub(crate) fn journal() -> (JournalSenders, Journal) {
             collisions: collisions.1,
             solver: solver.1,
             newest,
+            force_scale,
         },
     )
 }
@@ -101,7 +105,7 @@ impl Journal {
     pub fn write(mut self, mut recorder: Recorder, mut share: Option<Share>, clock: Clock) -> Written {
         let mut written = Written::default();
         let mut flushed_ms = 0.0;
-        let mut scores = ScoreKeeper::default();
+        let mut scores = ScoreKeeper::at(self.force_scale);
         // The first record names the scores, so that also a cut file has the names.
         recorder.scores(0, 0.0, &numbers(&scores)).err().into_iter().for_each(|fault| written.end(fault));
         loop {

@@ -19,6 +19,7 @@ use crate::run::journal::Written;
 use crate::run::stop::Stop;
 use crate::run::watch::Share;
 use crate::stages::collision_step::{CollisionStage, SoftFrame};
+use crate::stages::flap::FlapPlace;
 use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
@@ -99,6 +100,10 @@ pub(crate) struct View {
     pub removed_mm3: f64,
     /// Whether the bone is open, or need not be: only then a tool for the brain can be taken.
     pub bone_open: bool,
+    /// Where the planned flap is.
+    pub flap: FlapPlace,
+    /// Longest time that the tool rested on tissue so far, s.
+    pub hold_s: f64,
     /// Numbers of ticks, late ticks and ticks with a stale patch.
     pub counts: [u64; 3],
     /// Whether the operation is over.
@@ -123,6 +128,8 @@ impl View {
             spindle: 0.0,
             removed_mm3: 0.0,
             bone_open: true,
+            flap: FlapPlace::default(),
+            hold_s: 0.0,
             counts: [0; 3],
             finished: false,
         }
@@ -314,6 +321,8 @@ impl Ticks {
             spindle: stage.spindle_share(&tick.record),
             removed_mm3: stage.scores().bone_removed_mm3,
             bone_open: stage.is_open(),
+            flap: stage.flap_place(),
+            hold_s: stage.scores().longest_hold_s,
             counts: [self.count, self.late, self.held],
             finished,
         }

@@ -140,7 +140,7 @@ pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOn
     let Run { stages, start, recorder, share, scene, stop } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
-    let (senders, receivers) = journal();
+    let (senders, receivers) = journal(stages.haptic.force_scale());
     let JournalSenders { ticks, second: seconds, notices, collisions, solver } = senders;
     let Stages { haptic, second, tissue } = stages;
     let owned = |device| HapticDeviceOwner { device, stop: stop.clone() };

@@ -36,7 +36,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let removed = program.has_bone().then(|| value("bone removed", format!("{:.0} mm³", view.removed_mm3)));
     let task = [value("tool to brain", brain_mm)].into_iter().chain(removed).collect();
     let values = [
-        value("force of the task", format!("{:.1} N", view.task_n)),
+        value("force at the hand", format!("{:.2} N", view.force.length())),
         value("scale", view.force_scale.text()),
         value("depth in bone", format!("{:.2} mm", view.depth_mm[0])),
         value("depth in tissue", format!("{:.2} mm", view.depth_mm[1])),
@@ -48,6 +48,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         let Band { low, high, .. } = Band::of_tissue_force(view.force.length(), way_mm, depth_mm);
         value("force by the spread of stiffness", format!("{low:.2} to {high:.2} N"))
     });
+    // Only the force of bone is scaled.
+    let bone_scale = if sample.phase() == Phase::Brain { 1.0 } else { view.force_scale.0 };
     let second = view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length())));
     Panel {
         case: case.into(),
@@ -59,8 +61,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
             load: view.force.length() / view.force_limit_n.max(1e-3),
             alarm: active(view.warnings).any(|warning| DANGERS.contains(&warning)),
         },
-        force_n: view.force.length(),
-        force_limit_n: view.force_limit_n,
+        force_n: view.task_n,
+        force_limit_n: view.force_limit_n / bone_scale,
         choices: vec![tray(program, view)],
         values: values.into_iter().chain(band).chain(second).collect(),
         task,
@@ -124,6 +126,7 @@ pub(crate) fn hint(phase: Phase, by_hand: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force_scale::ForceScale;
     use crate::stages::haptic_tick::ToolSample;
     use crate::stages::notice::What;
     use trepan_geometry::{Pose, ToolState, Vec3};
@@ -146,6 +149,19 @@ mod tests {
         assert!(many.warnings == order && many.technical.is_empty(), "the most urgent first");
         assert_eq!((late.sound.spindle, late.sound.load), (0.5, 0.5));
         assert_eq!((late.choices[0].chosen, late.choices[0].options[1].0.as_str()), (1, "burr 4 mm"));
+    }
+
+    #[test]
+    fn the_force_is_that_of_the_task_and_so_is_its_limit() {
+        let mut view = View { task_n: 5.0, force_scale: ForceScale(0.2), ..view(0) };
+        let shown = |view: &View| {
+            let panel = panel("c", Program::Integrated, view);
+            let hand = panel.values.iter().any(|(name, text)| name == "force at the hand" && text == "1.00 N");
+            (panel.force_n, panel.force_limit_n, hand)
+        };
+        assert_eq!(shown(&view), (5.0, 10.0, true));
+        view.sample.tool = Program::Brain.tray()[0];
+        assert_eq!(shown(&view), (5.0, 2.0, true), "tissue is not scaled");
     }
 
     #[test]

@@ -34,6 +34,18 @@ enum State {
     Returning(usize),
 }
 
+/// Where the flap is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum FlapPlace {
+    /// Attached to the skull, or not known to be free.
+    #[default]
+    Attached,
+    /// Cut free, in its place or moving.
+    Free,
+    /// Lifted.
+    Away,
+}
+
 /// A voxel that went with the flap.
 #[derive(Clone, Copy, Debug)]
 struct Lifted {
@@ -68,6 +80,15 @@ impl Flap {
     /// Whether it is lifted.
     pub fn is_away(&self) -> bool {
         self.at == State::Away
+    }
+
+    /// Where it is.
+    pub fn place(&self) -> FlapPlace {
+        match self.at {
+            State::Skull | State::Searched => FlapPlace::Attached,
+            State::Cut | State::Lifting(_) | State::Returning(_) => FlapPlace::Free,
+            State::Away => FlapPlace::Away,
+        }
     }
 
     /// Whether it is being lifted or put back: no stroke can be undone meanwhile.
@@ -211,11 +232,14 @@ mod tests {
         }
         assert_eq!(run(&mut flap, 3, Buttons::PEDAL, true, true), []);
         let mm3 = (23 * 23 * 4) as f32;
+        assert_eq!(flap.place(), FlapPlace::Attached);
         assert_eq!(run(&mut flap, 40, none, false, false), [What::FlapFree(mm3)]);
+        assert_eq!(flap.place(), FlapPlace::Free);
         let cut = bone.snapshot();
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapLifted(mm3)]);
         assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing, "the flap is no stroke");
-        assert!(flap.is_away() && !bone.is_bone(IVec3::new(30, 30, 4)) && bone.is_bone(IVec3::new(10, 30, 4)));
+        assert!(flap.place() == FlapPlace::Away && flap.is_away());
+        assert!(!bone.is_bone(IVec3::new(30, 30, 4)) && bone.is_bone(IVec3::new(10, 30, 4)));
         run(&mut flap, 1, none, false, false);
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapReturned]);
         assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing);

@@ -5,7 +5,7 @@ pub(crate) mod alarms;
 pub(crate) mod collision_step;
 mod drill;
 mod fault;
-mod flap;
+pub(crate) mod flap;
 pub(crate) mod haptic_config;
 pub(crate) mod haptic_tick;
 mod motion;

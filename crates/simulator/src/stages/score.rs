@@ -9,6 +9,7 @@
 //!
 //! They are physical quantities; none is validated against clinical skill.
 
+use crate::force_scale::ForceScale;
 use crate::stages::motion::Motion;
 use serde::Serialize;
 use trepan_geometry::Vec3;
@@ -38,7 +39,7 @@ pub struct ScoreKeeper {
     pub burr_touches_of_brain: u32,
     /// Time of these touches, s.
     pub burr_on_brain_s: f64,
-    /// Largest force on the hand during them, N.
+    /// Largest force of the task during them, N.
     pub peak_burr_on_brain_n: f32,
     /// Time in which the tool pressed on tissue, s.
     pub tissue_s: f64,
@@ -48,12 +49,19 @@ pub struct ScoreKeeper {
     pub peak_tissue_force_n: f32,
     /// Largest depth of the probe in tissue, mm.
     pub peak_tissue_depth_mm: f32,
-    /// Largest force on the hand, N.
-    pub peak_force_n: f32,
-    /// Largest force of bone on the hand, N.
+    /// Largest depth of a tool for the brain past its rest surface, mm.
+    pub deepest_press_mm: f32,
+    /// Longest time in which the tool rested on tissue, s: its tip stayed within 0.5 mm.
+    pub longest_hold_s: f64,
+    /// Largest force of bone, N of the task.
     pub peak_bone_force_n: f32,
-    /// Largest change of force between two ticks, N.
-    pub peak_force_step_n: f32,
+    /// Largest force on the hand, N.
+    pub hand_peak_force_n: f32,
+    /// Largest change of the force on the hand between two ticks, N.
+    pub hand_peak_force_step_n: f32,
+    /// Newtons at the hand per newton of the task, on bone.
+    #[serde(skip)]
+    force_scale: ForceScale,
     /// How far the hand was past the brain's rest surface at the largest force of the tissue, and
     /// how deep in its present surface, mm.
     #[serde(skip)]
@@ -68,6 +76,9 @@ pub struct ScoreKeeper {
     motion: Motion,
     #[serde(skip)]
     tool: u8,
+    /// Where the tool came to rest on tissue, and the time since, s.
+    #[serde(skip)]
+    rest: Option<(Vec3, f64)>,
     #[serde(skip)]
     last_force: Vec3,
     #[serde(skip)]
@@ -79,6 +90,9 @@ pub struct ScoreKeeper {
 /// Longest time that counts for one tick, s.
 const MAX_TICK_S: f64 = 0.1;
 
+/// Distance within which a tip rests, mm: over the tremor of a hand, some 0.1 mm. A numerical parameter.
+const REST_MM: f32 = 0.5;
+
 /// Whether a tool for bone is past the brain's rest surface. This is a touch of the brain in
 /// warnings and scores.
 pub(crate) fn cuts_into_brain(record: &TickRecord) -> bool {
@@ -86,6 +100,11 @@ pub(crate) fn cuts_into_brain(record: &TickRecord) -> bool {
 }
 
 impl ScoreKeeper {
+    /// Makes the sums of a session whose device has a force scale.
+    pub(crate) fn at(force_scale: ForceScale) -> Self {
+        Self { force_scale, ..Self::default() }
+    }
+
     /// Returns the time of the newest tick, ms; 0 before the first.
     pub fn time_ms(&self) -> f64 {
         self.last_ms.unwrap_or(0.0)
@@ -106,9 +125,9 @@ impl ScoreKeeper {
         self.log_dimensionless_jerk = self.motion.log_dimensionless_jerk();
         self.tool_changes += u32::from(record.tool != self.tool);
         self.tool = record.tool;
-        self.peak_force_n = self.peak_force_n.max(force.length());
-        self.peak_bone_force_n = self.peak_bone_force_n.max((force - record.tissue_force).length());
-        self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
+        self.hand_peak_force_n = self.hand_peak_force_n.max(force.length());
+        self.peak_bone_force_n = self.peak_bone_force_n.max(self.force_scale.bone_n(record));
+        self.hand_peak_force_step_n = self.hand_peak_force_step_n.max((force - self.last_force).length());
         self.last_force = force;
         self.bone_removed_mm3 += f64::from(record.removed_mm3);
         self.times_through += u32::from(record.has(TickRecord::THROUGH));
@@ -119,17 +138,19 @@ impl ScoreKeeper {
                 self.cutting = [self.cutting[0] + seconds * bone_n, self.cutting[1] + seconds];
             }
         }
+        self.follow_rest(record, seconds);
         if record.phase == 0 {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
             let touching = cuts_into_brain(record);
             self.burr_touches_of_brain += u32::from(touching && !self.touching);
             if touching {
                 self.burr_on_brain_s += seconds;
-                self.peak_burr_on_brain_n = self.peak_burr_on_brain_n.max(force.length());
+                self.peak_burr_on_brain_n = self.peak_burr_on_brain_n.max(self.force_scale.task_n(record));
             }
             self.touching = touching;
         } else if record.tissue_depth_mm > 0.0 {
             self.tissue_s += seconds;
+            self.deepest_press_mm = self.deepest_press_mm.max(-record.brain_distance_mm);
             self.tissue_impulse_n_s += seconds * f64::from(record.tissue_n());
             self.peak_tissue_depth_mm = self.peak_tissue_depth_mm.max(record.tissue_depth_mm);
             if record.tissue_n() > self.peak_tissue_force_n {
@@ -137,6 +158,17 @@ impl ScoreKeeper {
                 self.peak_tissue = [-record.brain_distance_mm, record.tissue_depth_mm];
             }
         }
+    }
+
+    /// Measures how long the tool rests on tissue.
+    fn follow_rest(&mut self, record: &TickRecord, seconds: f64) {
+        let tip = record.proxy.translation;
+        self.rest = match self.rest {
+            _ if record.phase == 0 || record.tissue_depth_mm <= 0.0 => None,
+            Some((at, since_s)) if at.distance(tip) <= REST_MM => Some((at, since_s + seconds)),
+            _ => Some((tip, 0.0)),
+        };
+        self.longest_hold_s = self.rest.map_or(self.longest_hold_s, |(_, s)| self.longest_hold_s.max(s));
     }
 }
 
@@ -156,6 +188,38 @@ mod tests {
             keeper.idle_s
         };
         assert!((score(0..0) - score(100..200) - 0.1).abs() < 0.021, "{} {}", score(0..0), score(100..200));
+    }
+
+    #[test]
+    fn the_force_of_bone_is_of_the_task_and_apart_from_that_of_tissue() {
+        let wrench = Wrench { force: 3.0 * Vec3::Z, torque: Vec3::ZERO };
+        let mut keeper = ScoreKeeper::at(ForceScale(0.2));
+        keeper.add(&TickRecord { wrench, phase: 1, tissue_depth_mm: 1.0, ..TickRecord::default() });
+        assert_eq!((keeper.peak_bone_force_n, keeper.hand_peak_force_n), (0.0, 3.0), "no bone is touched");
+        keeper.add(&TickRecord { wrench, depth_mm: 0.1, time_ms: 1.0, ..TickRecord::default() });
+        assert_eq!((keeper.peak_bone_force_n, keeper.hand_peak_force_n), (15.0, 3.0));
+    }
+
+    #[test]
+    fn a_hold_is_the_longest_rest_on_tissue() {
+        let mut keeper = ScoreKeeper::default();
+        for i in 0..3000u16 {
+            // 1 s at rest, 0.1 s of motion, then 1.5 s at rest; in between the tissue is left.
+            let x = if i < 1000 { 0.0 } else { 0.05 * f32::from(i.min(1100) - 1000) };
+            let tissue_depth_mm = if i < 2600 { 1.0 } else { 0.0 };
+            let proxy = Pose::from_translation(Vec3::new(x, 0.0, 0.0));
+            let (time_ms, brain_distance_mm) = (f64::from(i), -2.5);
+            keeper.add(&TickRecord {
+                time_ms,
+                phase: 1,
+                proxy,
+                tissue_depth_mm,
+                brain_distance_mm,
+                ..Default::default()
+            });
+        }
+        assert!((keeper.longest_hold_s - 1.5).abs() < 0.02, "{}", keeper.longest_hold_s);
+        assert_eq!(keeper.deepest_press_mm, 2.5);
     }
 
     #[test]
@@ -181,7 +245,7 @@ mod tests {
         assert_eq!((keeper.plunge_mm, keeper.burr_touches_of_brain), (0.75, 2));
         assert!((keeper.burr_on_brain_s - 0.22).abs() < 1e-9 && keeper.peak_burr_on_brain_n == 1.0);
         assert_eq!(keeper.times_through, 2);
-        assert_eq!((keeper.peak_force_n, keeper.peak_force_step_n), (1.0, 1.0));
+        assert_eq!((keeper.hand_peak_force_n, keeper.hand_peak_force_step_n), (1.0, 1.0));
         for i in 0..200u16 {
             let wrench = Wrench { force: Vec3::Y * 0.5, torque: Vec3::ZERO };
             let (time_ms, tissue_depth_mm) = (2001.0 + f64::from(i), if i < 80 { 2.0 } else { 0.0 });

@@ -3,6 +3,7 @@
 use super::*;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case};
+use crate::force_scale::ForceScale;
 use crate::hand::DeviceLimits;
 use crate::ingredients::{KEYS, SolverDevice};
 use crate::measure::CaseErrors;
@@ -120,7 +121,7 @@ fn operated(line: &str) -> (Recording, SessionSetup) {
 /// Ticks that give the same force when the recording is replayed by its header.
 fn replayed(recording: &Recording) -> (u64, SessionSetup) {
     let setup = setup("", Some(recording));
-    let (senders, _pages) = journal();
+    let (senders, _pages) = journal(ForceScale::default());
     let tool = Program::Integrated.tray()[0];
     let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false };
     let mut replay = Replay::new(stages(&setup), recording, senders, start);

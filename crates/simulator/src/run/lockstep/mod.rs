@@ -58,7 +58,7 @@ pub(crate) fn run(
     let Run { stages, start, recorder, share, stop, .. } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
-    let (senders, receivers) = journal();
+    let (senders, receivers) = journal(stages.haptic.force_scale());
     let (sender, shots) = channel::<Shot>();
     let shots = film.is_some().then_some(shots);
     let mut film = film;
@@ -331,6 +331,7 @@ mod ingredients;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force_scale::ForceScale;
     use crate::program::Program;
     use crate::stages::haptic_config::HapticConfig;
     use crate::stages::notice::{Hindrance, What};
@@ -409,7 +410,7 @@ mod tests {
         assert!(undos.iter().any(|what| matches!(what, What::Undone(mm3) if *mm3 > 1.0)), "{undos:?}");
         assert!(raised.iter().any(|notice| matches!(notice.what, What::Force { waits: false, .. })));
         let (again, stages) = both_hands();
-        let (senders, _pages) = journal();
+        let (senders, _pages) = journal(ForceScale::default());
         let tool = Program::Craniotomy.tray()[0];
         let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false };
         let mut replay = Replay::new(stages, &recording, senders, start);

@@ -30,7 +30,7 @@ use crate::program::Phase;
 use crate::stages::alarms::{Feed, WarningInputs};
 use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm};
 use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
-use crate::stages::flap::Flap;
+use crate::stages::flap::{Flap, FlapPlace};
 use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, Watch, What};
 use crate::stages::score::ScoreKeeper;
@@ -211,6 +211,7 @@ impl HapticStage {
         };
         let rigid = config.program.tray().iter().map(contact_of).collect();
         let guard = ForceGuard::new(config.guard);
+        let scores = ScoreKeeper::at(ForceScale(config.force_scale));
         Self {
             rigid,
             guard,
@@ -223,7 +224,7 @@ impl HapticStage {
             tissue: ContactManifold::default(),
             slip_mm: Vec3::ZERO,
             watch: Watch::default(),
-            scores: ScoreKeeper::default(),
+            scores,
             last_valid: start,
             proxy,
             drill: Drill::default(),
@@ -251,6 +252,11 @@ impl HapticStage {
     pub fn release(&mut self) {
         self.guard.release();
         self.released = true;
+    }
+
+    /// Where the planned flap is.
+    pub(crate) fn flap_place(&self) -> FlapPlace {
+        self.flap.as_ref().map(Flap::place).unwrap_or_default()
     }
 
     /// Whether the force is released and zero.
