@@ -40,7 +40,7 @@ impl OpenDevice {
         rate_hz: f32,
         stop: &Stop,
     ) -> Result<Self, SessionError> {
-        let script = |name: Option<&str>| scripted(name.unwrap_or(program.script()), options, plan);
+        let script = |name: Option<&str>| scripted(name.unwrap_or(program.script()), program, options, plan);
         if let Some(name) = &options.watch {
             let (watched, watching) = Watched::open(name, script(None).map_err(refused)?.at(0.0), stop)?;
             return Ok(Self { device: Some(Box::new(watched)), watching: Some(watching), ..Self::default() });
@@ -56,7 +56,7 @@ impl OpenDevice {
     /// Opens the device of the second hand. Hardware runs on its own thread, so that its link never
     /// delays the first hand.
     pub fn second(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
-        let script = |name: Option<&str>| scripted(name.unwrap_or_default(), options, plan);
+        let script = |name: Option<&str>| scripted(name.unwrap_or_default(), Program::Integrated, options, plan);
         let mut beside = workspace(&plan.site, options.device_scale);
         // With both hands in the middle of their workspaces the tools are side by side.
         beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
@@ -90,9 +90,10 @@ fn refused(fault: impl std::fmt::Display) -> SessionError {
 const SCRIPT_S: (f64, f64) = (20.0, 75.0);
 
 /// Makes the script of an operation that follows a plan.
-fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, ScriptError> {
+fn scripted(name: &str, program: Program, options: &Options, plan: &Plan) -> Result<Script, ScriptError> {
     let usual_s = if name == "flap" { SCRIPT_S.1 } else { SCRIPT_S.0 };
-    let how = script::Plan { outline: plan.outline.clone(), ..script::Plan::default() };
+    let usual = if program.has_tissue() { script::Plan::default() } else { script::Plan::of_bone() };
+    let how = script::Plan { outline: plan.outline.clone(), ..usual };
     Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how)
 }
 

@@ -93,6 +93,8 @@ pub struct Plan {
     pub outline: Vec<Rim>,
     /// Depth of the centre of the craniotome's foot below the bone, mm.
     pub foot_mm: f32,
+    /// Whether a flap's operation goes on to press the brain.
+    pub presses_after_flap: bool,
 }
 
 impl Default for Plan {
@@ -112,7 +114,16 @@ impl Default for Plan {
             retract_mm: [3.0, 4.0],
             outline: Vec::new(),
             foot_mm: 0.8,
+            presses_after_flap: true,
         }
+    }
+}
+
+impl Plan {
+    /// An operation that ends at the bone: no tool comes to the brain, and no probe needs room.
+    pub fn of_bone() -> Self {
+        let usual = Self::default();
+        Self { burr_overlap_mm: -usual.burr_clearance_mm, presses_after_flap: false, ..usual }
     }
 }
 
@@ -233,7 +244,7 @@ fn flap(site: &Site, plan: &Plan) -> (Vec3, Vec<Move>) {
         Move("draw back", 3.0, out, HANDS_OFF),
         Move("lift the flap", 2.0, out, Buttons::FLAP),
     ]);
-    let brain = [change(site, plan), probe(site, plan)].into_iter().flatten();
+    let brain = [change(site, plan), probe(site, plan)].into_iter().flatten().filter(|_| plan.presses_after_flap);
     moves.extend(brain.map(|m| Move(m.0, 0.8 * m.1, m.2, m.3)));
     (hole.below(-plan.start_mm), moves)
 }

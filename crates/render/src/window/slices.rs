@@ -54,7 +54,7 @@ pub(crate) fn marks(ui: &egui::Ui, column: Rect, planes: &[Plane; 3], chosen: bo
         }
     }
     if brain {
-        let at = column.left_bottom() + egui::vec2(6.0, -4.0);
+        let at = column.left_bottom() + egui::vec2(6.0, -26.0);
         let [red, green, blue] = (255.0 * OUTLINE).to_array().map(|share| share as u8);
         let outline = Color32::from_rgb(red, green, blue);
         let text = format!("— {}", tr("surface of the brain model"));

@@ -1,9 +1,11 @@
 //! The result page of a session, the list of all sessions and the list of lessons.
 
 use crate::desk::action::Action;
-use crate::printable::printable;
+use crate::desk::settings::Recent;
+use crate::printable::{count, printable};
 use crate::report::debrief::{Debrief, Row};
 use crate::report::kept::Kept;
+use crate::report::sessions::{self, SessionRow};
 use crate::training::Lesson;
 use std::path::Path;
 use trepan_render::window::{Item, Page};
@@ -23,8 +25,8 @@ pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Act
     items.extend([verdict, Item::Table(table(&debrief))]);
     if debrief.earlier > 0 {
         items.push(Item::Note(format!(
-            "compared with {} earlier sessions: {}",
-            debrief.earlier,
+            "compared with {}: {}",
+            count(debrief.earlier, "earlier session"),
             printable(&session.person)
         )));
     }
@@ -86,29 +88,38 @@ fn home() -> Item<Action> {
 }
 
 /// The page of all sessions.
-pub(crate) fn list(kept: &[Kept], lessons: &[Lesson]) -> Page<Action> {
-    let row = |session: &Kept| {
-        let (title, folder) = (when(&session.title), session.folder.clone());
-        let lesson = lessons.iter().find(|lesson| lesson.name == session.lesson).map(|lesson| &lesson.title);
-        let more = [Some(&session.person), lesson].into_iter().flatten().filter(|text| !text.is_empty());
-        let more: String = more.map(|text| format!(", {}", printable(text))).collect();
+pub(crate) fn list(kept: &[Kept], lessons: &[Lesson], recent: &[Recent]) -> Page<Action> {
+    let row = |session: &SessionRow| {
+        let folder = session.folder.clone();
+        let title = when(&folder.file_name().unwrap_or_default().to_string_lossy());
+        let passed = session.passed.map(|passed| String::from(if passed { "passed" } else { "not passed" }));
+        let dice = session.dice.map(|dice| format!("Dice {dice:.2}"));
+        let plunge = session.plunge_mm.map(|mm| format!("plunge {mm:.1} mm"));
+        let known = [&session.person, &session.program, &session.case, &session.lesson].map(|text| printable(text));
+        let all = known.into_iter().chain([passed, dice, plunge].into_iter().flatten());
+        let line: Vec<String> = all.filter(|text| !text.is_empty()).collect();
         Item::Row(vec![
             Item::button(title, "its result", Action::Result(folder.clone())),
             Item::button("Report", "in the browser", Action::Report(folder.clone())),
             Item::button("Replay", "shows it again", Action::Replay(folder)),
-            Item::Note(format!("{}, {}, {}{more}", session.program, session.case, session.device)),
+            Item::Note(line.join(", ")),
         ])
     };
+    let kept = sessions::rows(kept, lessons, recent);
     let rows: Vec<_> = kept.iter().map(row).collect();
     let none = rows.is_empty().then(|| Item::Text("No session was kept yet.".into()));
     Page {
         title: "Sessions".into(),
-        line: format!("{} sessions, the newest first; none is ever overwritten", kept.len()),
+        line: format!("{}, the newest first; none is ever overwritten", count(kept.len(), "session")),
         columns: vec![rows.into_iter().chain(none).collect()],
         foot: vec![home()],
         escape: Some(Action::Home),
         ..Page::default()
     }
+}
+
+fn tried(times: usize) -> String {
+    format!("{times} {}", if times == 1 { "try" } else { "tries" })
 }
 
 /// The page of all lessons; `closed` is why none can begin.
@@ -118,9 +129,9 @@ pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: O
         let tries = kept.iter().filter(mine);
         let passed = tries.clone().any(|kept| Debrief::of(&kept.summary, Some(lesson), &[]).passed == Some(true));
         let state = match (passed, tries.count()) {
-            (true, count) => format!("passed, {count} tries"),
+            (true, tries) => format!("passed, {}", tried(tries)),
             (false, 0) => "not tried yet".into(),
-            (false, count) => format!("not passed yet, {count} tries"),
+            (false, tries) => format!("not passed yet, {}", tried(tries)),
         };
         let begin = match closed {
             None if passed => Item::button("Begin", "once more", Action::Lesson(at)),

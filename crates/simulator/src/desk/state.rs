@@ -494,7 +494,9 @@ impl Desk {
             Action::Check => self.check(),
             Action::OpenAt(_) | Action::Drag(_) | Action::Draw(_) | Action::RoundFlap => self.look(action),
             Action::Blend(_) | Action::Slide(..) | Action::Cross(..) | Action::Turn(..) => self.look(action),
-            Action::Sessions => self.view = View::Page(Box::new(results::list(&self.kept(), &lessons()))),
+            Action::Sessions => {
+                self.view = View::Page(Box::new(results::list(&self.kept(), &lessons(), &self.form.settings.recent)))
+            }
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
             }
