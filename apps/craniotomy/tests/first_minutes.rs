@@ -5,6 +5,7 @@
 
 #[path = "../../integrated/tests/dicom/mod.rs"]
 mod dicom;
+#[expect(dead_code, reason = "another test uses the rest")]
 mod person;
 
 use glam::{Mat2, Quat, Vec2, Vec3};

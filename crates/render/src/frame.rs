@@ -46,8 +46,8 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// The tool, if one is shown.
     pub tool: Option<Tool>,
-    /// The tool's pose. Slices pass through its tip unless [`SliceLook::through`] says otherwise, or
-    /// through the camera's target if the tip is outside the scanned box.
+    /// The tool's pose. Slices pass through its tip unless [`SliceLook::through`] says otherwise,
+    /// or through the camera's target if the tip is outside the scanned box.
     pub world_from_tool: Pose,
     /// The tool in the other hand, and its pose.
     pub second: Option<(Tool, Pose)>,

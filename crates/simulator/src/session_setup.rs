@@ -3,7 +3,6 @@
 use crate::case::Case;
 use crate::case::anchors::Held;
 use crate::case::plan::Plan;
-use crate::case::remark;
 use crate::case::scene::{RestBrain, Scene};
 use crate::error::SessionError;
 use crate::hand::DeviceLimits;
@@ -11,6 +10,7 @@ use crate::ingredients::{Ingredients, Support};
 use crate::models::Models;
 use crate::operation::Operation;
 use crate::program::Program;
+use crate::remark;
 use crate::report::regions::{Region, regions};
 use crate::run::{self, Stages};
 use crate::solver::{self, Ran};

@@ -5,8 +5,8 @@
 //! volume names it. Later sources override earlier ones. Labels outside the brain are left out and
 //! counted.
 
-use crate::case::remark::WELL;
 use crate::error::SessionError;
+use crate::remark::WELL;
 use glam::DAffine3;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

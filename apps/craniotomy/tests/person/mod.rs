@@ -117,7 +117,7 @@ impl Person {
         std::thread::sleep(Duration::from_secs(2));
     }
 
-    /// Ends the nth session, says yes to the question, and waits for its summary and its result page.
+    /// Ends the nth session, says yes to the question, and waits for its summary and result page.
     pub fn ends(&self, nth: usize) -> serde_json::Value {
         // A slow picture may miss a click.
         self.waits_for("the summary", || {

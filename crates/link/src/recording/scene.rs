@@ -230,7 +230,7 @@ mod tests {
             spindle: 0.5,
             voxels: (0..n).map(change).collect(),
             cuts: (0..3 * n).map(change).collect(),
-            nodes: (n % 3 == 0).then(|| vec![[n as i16, -3, 9]; 40]),
+            nodes: n.is_multiple_of(3).then(|| vec![[n as i16, -3, 9]; 40]),
         };
         (0..200).map(of).collect()
     }

@@ -320,8 +320,8 @@ impl<S: Session, D: Draws> Window<S, D> {
         })
     }
 
-    /// Draws the marks of the slices in a column, and returns the point that the mouse chooses there
-    /// if the input is `ours`.
+    /// Draws the marks of the slices in a column, and returns the point that the mouse chooses
+    /// there if the input is `ours`.
     fn on_slices(
         &self,
         ui: &egui::Ui,

@@ -12,7 +12,7 @@
 //! | Space (held) | the drill's pedal |
 //! | 1 to 9, N | takes a tool; the next tool |
 //! | U, Y, X | undoes a stroke; redoes it; draws the tool back |
-//! | D, F2 to F6 | centres the view on the tool; the whole head from the front, back, left, right, top |
+//! | D, F2 to F6 | centres the tool; the whole head from the front, back, left, right, top |
 //! | I, F11 | light or dark; full screen |
 //! | arrows, Page Up, Page Down | move the tool by half a millimetre |
 //! | + and -, R | zoom; back to the first view |
@@ -40,6 +40,8 @@ mod app;
 mod banner;
 mod capture;
 mod draws;
+#[cfg(test)]
+mod ending_and_slices;
 mod guide;
 mod host;
 mod input;

@@ -1,10 +1,10 @@
 //! Builds a skull on cubic voxels, a brain mask and tetrahedra from a patient's images.
 
-use crate::case::remark::WELL;
 use crate::case::{Brain, Inputs};
 use crate::error::SessionError;
 use crate::mixture;
 use crate::recipe::Recipe;
+use crate::remark::WELL;
 use glam::DAffine3;
 use std::path::Path;
 use trepan_mesh::lattice::{self, Fine};

@@ -10,7 +10,6 @@ pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod opening;
 pub(crate) mod plan;
-pub(crate) mod remark;
 pub(crate) mod scene;
 mod space;
 mod stages;

@@ -13,10 +13,10 @@ use crate::case::plan::Plan;
 use crate::desk::action::Action;
 use crate::desk::form::Form;
 use crate::desk::pages::{across_mm, by_controls, images};
-use crate::desk::settings::Source;
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::program::Program;
+use crate::settings::Source;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, DVec3, Vec2};
 use std::sync::Arc;
@@ -41,7 +41,7 @@ const POINT_MM: f32 = 1.0;
 const STEP_MM: f32 = 0.4;
 /// Way of a page of the slices for a notch, mm, numerical.
 const PAGE_MM: f32 = 1.0;
-/// Depth down to which bone and brain are sought, mm, and the largest gap within bone, mm, numerical.
+/// Depth down to which bone and brain are sought, and the largest gap within bone, mm, numerical.
 const DEEPEST_MM: f32 = 60.0;
 const HOLLOW_MM: f32 = 3.0;
 /// Turn of the head for a drag over the whole picture, rad, numerical.

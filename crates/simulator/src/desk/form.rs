@@ -2,10 +2,10 @@
 
 use crate::desk::browse::Goal;
 use crate::desk::language::Languages;
-use crate::desk::settings::{Images, Recent, Settings, Source, sessions};
 use crate::error::SessionError;
 use crate::options::{Options, Patient};
 use crate::program::{Program, called};
+use crate::settings::{Images, Recent, Settings, Source, sessions};
 use crate::tissue_class::{TissueClass, TissueSource};
 use std::path::{Path, PathBuf};
 use trepan_budget::Quality;

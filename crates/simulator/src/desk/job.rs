@@ -1,10 +1,10 @@
 //! A session on its own thread: it loads, runs in the window and writes its files.
 
 use crate::case::Case;
-use crate::desk::settings::Settings;
 use crate::error::SessionError;
 use crate::progress::{Progress, RUNNING, Stage};
 use crate::session::{Ended, Place};
+use crate::settings::Settings;
 use std::thread::JoinHandle;
 
 /// What a job came to.
@@ -106,7 +106,7 @@ fn expected(settings: &Settings, again: bool, stage: &str) -> f64 {
 
 /// Share of the time spent in a late stage that is still expected of it, numerical.
 const LATE: f64 = 0.25;
-/// Expected time of the ended stages from which they tell how fast the machine is now, s, numerical.
+/// Expected time of the ended stages from which they tell how fast the machine is, s, numerical.
 const TELLING_S: f64 = 1.0;
 
 /// Returns the share of loading that is done, and the time left, s. Where the stages so far took

@@ -17,7 +17,6 @@ mod language;
 mod pages;
 mod pictures;
 mod results;
-pub(crate) mod settings;
 mod state;
 
 pub(crate) use job::Done;

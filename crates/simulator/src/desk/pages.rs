@@ -3,10 +3,10 @@
 use crate::desk::action::Action;
 use crate::desk::browse::{Folder, Goal};
 use crate::desk::form::Form;
-use crate::desk::settings::{Images, Recent, Source};
 use crate::error::SessionError;
 use crate::printable::{capital, printable};
 use crate::program::Program;
+use crate::settings::{Images, Recent, Source};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_geometry::Vec3;

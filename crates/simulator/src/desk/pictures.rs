@@ -1,6 +1,6 @@
 //! Pictures of cases for the start page.
 
-use crate::desk::settings::{Recent, Source};
+use crate::settings::{Recent, Source};
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;

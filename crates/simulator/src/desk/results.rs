@@ -1,11 +1,11 @@
 //! The result page of a session, the list of all sessions and the list of lessons.
 
 use crate::desk::action::Action;
-use crate::desk::settings::Recent;
 use crate::printable::{count, printable};
 use crate::report::debrief::{Debrief, Row};
 use crate::report::kept::Kept;
 use crate::report::sessions::{self, SessionRow};
+use crate::settings::Recent;
 use crate::training::Lesson;
 use std::path::Path;
 use trepan_render::window::{Item, Page};

@@ -13,11 +13,11 @@ mod page;
 mod trial;
 
 use crate::error::SessionError;
-use crate::report::output::whole;
 use crate::report::summary::Machine;
 use crate::run::clock::{Clock, Schedule};
 use crate::run::stop::Stop;
 use crate::run::threads::{HapticDeviceOwner, real_time};
+use crate::whole::whole;
 use measured::{Ending, Floor, Measured, Sample, TestRun, Timing};
 use std::fmt::Display;
 use std::fs;

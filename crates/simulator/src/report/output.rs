@@ -8,11 +8,11 @@ use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
 use crate::report::{csv, slicer};
 use crate::run::Outcome;
+use crate::whole::whole;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use trepan_link::Recording;
@@ -241,15 +241,6 @@ fn scores(summary: &Summary) -> String {
         _ = writeln!(csv, "warnings.{name}.count,{count}\nwarnings.{name}.first_s,{first_s}");
     }
     csv
-}
-
-/// Writes a file atomically.
-pub(crate) fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
-    let failed = SessionError::output(path);
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.persist(path).map(drop).map_err(|fault| failed(fault.error))
 }
 
 #[cfg(test)]

@@ -4,15 +4,15 @@
 //! [`rows`] reads each session's own `summary.json`; whether a lesson is passed is found anew from
 //! its marks. Replays and watched sessions are left out: they are nobody's work.
 
-use crate::desk::settings::{Recent, Settings, sessions};
 use crate::error::SessionError;
 use crate::options::Wanted;
 use crate::printable::{columns, count, printable};
 use crate::report::csv;
 use crate::report::debrief::Debrief;
 use crate::report::kept::Kept;
-use crate::report::output::whole;
+use crate::settings::{Recent, Settings, sessions};
 use crate::training::Lesson;
+use crate::whole::whole;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -10,7 +10,7 @@
 
 use crate::case::plan::Plan;
 use crate::error::SessionError;
-use crate::report::output::whole;
+use crate::whole::whole;
 use serde_json::{Value, json};
 use std::f32::consts::TAU;
 use std::path::Path;

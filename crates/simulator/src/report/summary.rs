@@ -176,8 +176,8 @@ pub struct CutOff {
 }
 
 impl CutOff {
-    /// Adds the pieces that notices say were lifted and not put back: they are no longer there to be
-    /// found.
+    /// Adds the pieces that notices say were lifted and not put back: they are no longer there to
+    /// be found.
     fn with_lifted(self, notices: &[Notice]) -> Self {
         let mut lifted: Vec<f64> = Vec::new();
         for notice in notices {

@@ -1,5 +1,6 @@
 //! Rendering on the main thread: into files or a window.
 
+mod closeups;
 mod colours;
 pub(crate) mod driver;
 pub(crate) mod graphics;

@@ -90,8 +90,8 @@ pub(crate) fn camera(site: &Site) -> Camera {
 /// wide.
 const FIRST_WIDE_MM: f32 = 80.0;
 
-/// Returns the first camera of a window: down the approach, close enough for the opening to fill the
-/// view. It is inclined as the microscope is.
+/// Returns the first camera of a window: down the approach, close enough for the opening to fill
+/// the view. It is inclined as the microscope is.
 pub(crate) fn first_view(site: &Site) -> Camera {
     let scope = microscope(site);
     let fov_rad = camera(site).fov_rad;

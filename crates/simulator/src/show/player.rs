@@ -3,8 +3,8 @@
 //! # Practice
 //! Pose, tool, forces and depths are those of the recorded tick, at any time at once. Skull and
 //! brain are the session's film ([`crate::run::film`]), read from its file or made while it is
-//! shown; then the window says how far it is. Seeking writes the voxels and nodes that changed in
-//! between, some 20 ns each, at most [`MAX_VOXELS`] per picture: a longer jump takes a few pictures.
+//! shown; then the window says how far it is. Seeking writes the voxels and nodes that changed
+//! in between, some 20 ns each, at most [`MAX_VOXELS`] per picture: a longer jump takes more.
 //! The brain's nodes are interpolated between the shots that hold them.
 
 use crate::printable::capital;
@@ -226,7 +226,7 @@ impl Player {
             let age_ms = 1e3 * at_s - event.time_ms;
             (0.0..NEWS_MS).contains(&age_ms) && !["warning", "cleared"].contains(&&*event.kind)
         };
-        let event = events.filter(|event| !STREAMED.contains(&&*event.kind)).filter(is_shown).last();
+        let event = events.filter(|event| !STREAMED.contains(&&*event.kind)).rfind(is_shown);
         let behind = at_s > ready_s + BEHIND_S;
         let behind = behind.then(|| format!("skull and brain are computed: {ready_s:.0} s of {length_s:.0} s"));
         behind.into_iter().chain(event.map(|event| capital(&event.text))).collect()

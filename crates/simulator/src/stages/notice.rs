@@ -280,8 +280,8 @@ pub(crate) struct Watch {
     quiet_since_ms: [f64; Warning::ALL.len()],
 }
 
-/// Time that a cause must be absent before its warning is cleared, ms: over the time in which a hand
-/// that hovers at a threshold crosses it again. A numerical parameter.
+/// Time that a cause must be absent before its warning is cleared, ms. A hand that hovers at a
+/// threshold crosses it again sooner. A numerical parameter.
 const CLEAR_MS: f64 = 500.0;
 
 impl Watch {

@@ -90,7 +90,8 @@ pub struct ScoreKeeper {
 /// Longest time that counts for one tick, s.
 const MAX_TICK_S: f64 = 0.1;
 
-/// Distance within which a tip rests, mm: over the tremor of a hand, some 0.1 mm. A numerical parameter.
+/// Distance within which a tip rests, mm: over the tremor of a hand, some 0.1 mm. A numerical
+/// parameter.
 const REST_MM: f32 = 0.5;
 
 /// Whether a tool for bone is past the brain's rest surface. This is a touch of the brain in

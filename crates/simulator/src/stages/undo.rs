@@ -25,8 +25,8 @@ use trepan_volume::{BoneVolume, MAX_STROKES};
 /// Bricks exchanged in a tick: some 20 us.
 const BRICKS: usize = 8;
 
-/// Ticks in which a request refused for the tool is repeated, and ticks between two tries: 4 s and a
-/// tenth of a second at 1 kHz, the time to draw a tool out. Numerical parameters.
+/// Ticks in which a request refused for the tool is repeated, and ticks between two tries. At 1 kHz
+/// 4 s and a tenth of a second, the time to draw a tool out. Numerical parameters.
 const WAIT: [u32; 2] = [4000, 100];
 
 /// Data of a stroke besides its bone.

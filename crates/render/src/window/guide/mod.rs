@@ -11,7 +11,7 @@
 //!   dragged           the hand goes the pointer's way across the shaft, on the surface, or at its
 //!                     depth in a hole; a craniotome keeps its foot under the bone. A cutting tool
 //!                     is slower than the pointer: it follows the way, not the chord
-//!   the feed ends     a craniotome's foot rides FOOT_MM below the inner table; any other tool stops
+//!   the feed ends     a craniotome's foot rides FOOT_MM below the inner table; others stop
 //!                     where it touches the brain, a tool for the brain PRESS_MM deeper. Where no
 //!                     brain is known, a ball stops at the inner table
 //! left button up      the tool rises, a craniotome out of its cut
@@ -56,14 +56,14 @@ const TRAIL: usize = 64;
 const TRAIL_MM: f32 = 0.5;
 /// Depth of the centre of a craniotome's foot below the bone, mm.
 const FOOT_MM: f32 = 0.8;
-/// Radii of the rings around a tool in which the inner table is sought beside its own, mm: up to the
-/// radius of a flap. A numerical parameter.
+/// Radii of the rings around a tool in which the inner table is sought beside its own, mm: up to
+/// the radius of a flap. A numerical parameter.
 const TABLE_MM: [f32; 4] = [0.0, 6.0, 10.0, 16.0];
-/// Way of a tool for the brain from its first touch on, mm: the deepest press of the scripts. It is a
-/// depth, as a mouse does not feel a force that could stop a hand.
+/// Way of a tool for the brain from its first touch on, mm: the deepest press of the scripts. It is
+/// a depth, as a mouse does not feel a force that could stop a hand.
 const PRESS_MM: f32 = 6.0;
-/// Height of a ball's centre over the inner table where the feed ends without a brain, in radii: the
-/// hole is then wider than the second of [`WIDE`].
+/// Height of a ball's centre over the inner table where the feed ends without a brain, in radii.
+/// The hole is then wider than the second of [`WIDE`].
 const END: f32 = 0.5;
 /// Distance at which a craniotome finds a hole, mm.
 const SEAT_MM: f32 = 4.5;

@@ -191,12 +191,14 @@ fn a_craniotome_goes_under_the_bone_and_is_drawn_out_when_the_button_is_let_go()
     assert!(bench.hand.translation.z > 3.0, "{}", bench.hand.translation);
 }
 
+type Cast<'a> = &'a dyn Fn(&Ray) -> Option<SurfaceHit>;
+
 #[test]
 fn a_held_button_ends_every_feed_at_the_inner_table_or_a_set_depth_in_the_brain() {
     let no_brain = |ray: &Ray| slab(&Ray { brain: false, ..*ray });
     let wide = |ray: &Ray| no_brain(ray).filter(|hit| (ray.from + hit.distance_mm * ray.along).x < 3.0);
-    let without: [&dyn Fn(&Ray) -> Option<SurfaceHit>; 2] = [&no_brain, &wide];
-    let deepest = |tool, cast: &dyn Fn(&Ray) -> Option<SurfaceHit>| {
+    let without: [Cast<'_>; 2] = [&no_brain, &wide];
+    let deepest = |tool, cast: Cast<'_>| {
         let mut bench = Bench::with(tool);
         bench.hand.translation = Vec3::new(0.0, 0.0, 3.0);
         bench.tip = bench.hand;

@@ -6,7 +6,7 @@
 //! a recent case is opened from them again; they are never shown.
 
 use crate::error::SessionError;
-use crate::report::output::whole;
+use crate::whole::whole;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
