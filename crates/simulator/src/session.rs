@@ -574,3 +574,68 @@ fn check_outputs(options: &Options) -> Result<(), SessionError> {
         false => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TissueSource;
+    use clap::Parser;
+
+    /// Bone voxels of a skull, also where it is cut.
+    fn bone_of(skull: &BoneVolume) -> Vec<bool> {
+        skull.snapshot().data.iter().map(|hu| *hu >= skull.isovalue()).collect()
+    }
+
+    /// A craniotomy of the built-in case by a device, without pictures.
+    fn opened(home: &Path, out: &str, device: &str, seconds: f64) -> Session {
+        let head = trepan_fixtures::case_head();
+        let tissues = TissueSource::regions_of_aseg(head.aseg);
+        let (ct, mri, labels) = (Some(head.ct), Some(head.mri), Some(head.labels));
+        let built_in = Inputs { name: Some(head.name), ct, mri, labels, tissues };
+        let fixed = ["x", "--headless", "--frames-per-second", "0", "--quality", "draft"];
+        let mut options = Options::try_parse_from(fixed).unwrap();
+        options.patient.cache = Some(home.join("cases"));
+        (options.out, options.duration) = (Some(home.join(out)), Some(seconds));
+        options.device = Some(device.into());
+        Session::open(Program::Craniotomy, options, built_in).unwrap()
+    }
+
+    #[test]
+    fn the_film_shows_the_skull_of_the_session_and_of_its_replay_at_any_time() {
+        let home = tempfile::tempdir().unwrap();
+        let session = opened(home.path(), "live", "script:craniotomy", 8.0);
+        let skull = session.setup.bone().cloned().unwrap();
+        let shown = BoneVolume::new(&skull.snapshot(), skull.isovalue()).unwrap();
+        session.run().unwrap();
+        let recorded = home.path().join("live").join(output::RECORDING);
+        let header = Recording::open(&recorded).unwrap().header;
+        let scene = trepan_link::read_scene(&output::scene_of(&recorded), &header).unwrap().unwrap();
+        let base = View::at(
+            ToolSample {
+                tick: 0,
+                state: ToolState::at(trepan_geometry::Pose::IDENTITY),
+                tool: Program::Craniotomy.tray()[0],
+                slot: 0,
+                drilling: false,
+            },
+            1.0,
+        );
+        let mut shots = scene.into_iter().map(|record| filmed::Shot::of(record, base)).peekable();
+        for seconds in [2.0, 3.7, 5.1] {
+            while let Some(shot) = shots.next_if(|shot| shot.view.time_ms <= 1e3 * seconds) {
+                shot.write(&shown, true);
+            }
+            let replay =
+                opened(home.path(), &format!("replay-{seconds}"), &format!("replay:{}", recorded.display()), seconds);
+            let again = replay.setup.bone().cloned().unwrap();
+            replay.run().unwrap();
+            let (film, replayed) = (bone_of(&shown), bone_of(&again));
+            // A shot is up to 33 ms old.
+            let other = film.iter().zip(&replayed).filter(|(a, b)| a != b).count();
+            let gone = bone_of(&skull).len() - film.iter().filter(|bone| **bone).count();
+            assert!(other <= 3 && gone > 0, "{other} voxels differ after {seconds} s");
+        }
+        shots.for_each(|shot| _ = shot.write(&shown, true));
+        assert!(shown.snapshot().data == skull.snapshot().data, "the same at the end, to the last digit");
+    }
+}
