@@ -174,3 +174,52 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     eprintln!("plan {}", summary["plan"]);
     assert!(summary["plan"]["dice"].as_f64().unwrap() > 0.8, "{}", summary["plan"]);
 }
+
+/// Middle of the axial slice at 1280 by 800.
+const AXIAL: [f32; 2] = [870.0, 130.0];
+/// From the left edge of "Back to the start page" to the middle of "Replay", pixels.
+const TO_REPLAY: u32 = 334;
+
+#[test]
+fn nothing_that_a_person_does_by_accident_cuts_or_ends() {
+    let home = tempfile::tempdir().unwrap();
+    let Some(person) = Person::sits_down(home.path(), &serde_json::json!({ "quality": "draft" }).to_string()) else {
+        eprintln!("Xvfb or xdotool is missing: nobody sat down");
+        return;
+    };
+    person.goes_on();
+    person.waits_for_session(1);
+    let removed =
+        |person: &Person| person.recording().ticks.iter().map(|tick| f64::from(tick.removed_mm3)).sum::<f64>();
+    person.points(AXIAL);
+    person.rests(1.0);
+    let before = person.tick().device.translation;
+    person.does("mousedown 1");
+    person.rests(4.0);
+    person.does("mouseup 1");
+    person.does("click --repeat 20 --delay 10 5");
+    person.rests(1.0);
+    let moved_mm = person.tick().device.translation.distance(before);
+    assert!(removed(&person) == 0.0 && moved_mm < 0.1, "a slice moved the tool by {moved_mm} mm");
+    let runs_on = |person: &Person, after: &str| {
+        let then = person.tick().time_ms;
+        person.rests(2.0);
+        assert!(person.tick().time_ms > then + 500.0, "{after} ended the operation");
+    };
+    (0..3).for_each(|_| _ = person.does("key Escape"));
+    runs_on(&person, "Escape");
+    person.does("key q");
+    person.rests(1.0);
+    runs_on(&person, "Q alone");
+    person.does("key Escape");
+    let summary = person.ends(1);
+    assert_eq!(summary["bone_removed_mm3"].as_f64(), Some(0.0));
+    person.waits_for("the result", || person.main_button().is_some());
+    let [x, y] = person.main_button().unwrap();
+    person.clicks([x - 20 + TO_REPLAY, y]);
+    person.waits_for("the replay", || person.main_button().is_none());
+    person.rests(8.0);
+    person.does("key q");
+    person.waits_for("the result again", || person.main_button().is_some());
+    assert_eq!(person.number_of_sessions(), 1, "a replay is no session");
+}

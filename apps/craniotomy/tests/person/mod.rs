@@ -70,7 +70,7 @@ impl Person {
     }
 
     /// Middle of the button of the usual next step: the first large patch in its colour, sky blue.
-    fn main_button(&self) -> Option<[u32; 2]> {
+    pub fn main_button(&self) -> Option<[u32; 2]> {
         let args = ["-window", "root", "-depth", "8", "rgb:-"];
         let pixels = Command::new("import").args(args).env("DISPLAY", &self.display).output().ok()?.stdout;
         let is_sky = |x: usize, y: usize| pixels.get(3 * (y * WIDTH + x)..).is_some_and(|rgb| rgb.starts_with(&SKY));
@@ -99,6 +99,11 @@ impl Person {
         let programs = fs::read_dir(self.home.join("sessions")).into_iter().flatten().flatten();
         let entries = programs.flat_map(|program| fs::read_dir(program.path()).into_iter().flatten().flatten());
         entries.map(|entry| entry.path()).filter(|path| path.join(with).is_file()).collect()
+    }
+
+    /// Number of folders of sessions.
+    pub fn number_of_sessions(&self) -> usize {
+        self.sessions("session.mcap").len()
     }
 
     /// Number of cases that the start page remembers.

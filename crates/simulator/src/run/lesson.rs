@@ -14,7 +14,7 @@
 //!
 //! # Practice
 //! The haptic loop reads one cell a tick (some ns) and never blocks. All requests end when the
-//! teacher has sent nothing for three seconds. A replay needs no teacher: the recorded readings
+//! teacher has sent nothing for six seconds. A replay needs no teacher: the recorded readings
 //! hold the requests.
 
 use trepan_contact::GuardedWrench;
@@ -24,8 +24,9 @@ use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
 use trepan_link::wire::TeacherRecord;
 
-/// Time without a record after which all of the teacher's requests end, ms.
-pub(crate) const GONE_MS: f64 = 3000.0;
+/// Time without a record after which all of the teacher's requests end, ms. A slow picture of a
+/// busy watcher takes less, so that a pause holds until it is taken back.
+pub(crate) const GONE_MS: f64 = 6000.0;
 
 /// Bit of each request, and the text that the trainee reads.
 pub(crate) const TEACHER_REQUESTS: [(u32, &str); 3] = [
