@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn a_scene_comes_back_whole_cut_or_not_at_all() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("scene.mcap");
+        let path = folder.path().join("a.scene");
         let header = SessionHeader { case: "case".into(), ..SessionHeader::default() };
         let mut writer = SceneWriter::create(&path, &header).unwrap();
         records().iter().for_each(|record| writer.write(record).unwrap());
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn a_record_with_many_changes_is_split() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("scene.mcap");
+        let path = folder.path().join("a.scene");
         let header = SessionHeader::default();
         let voxels = vec![SceneChange { at: [1, 2, 3], before: 900, after: -1000 }; 2 * MOST_CHANGES + 5];
         let record = SceneRecord { voxels, nodes: Some(vec![[1; 3]]), ..SceneRecord::default() };

@@ -40,7 +40,7 @@ const NAMES: [&str; 14] = [
 pub(crate) const RECORDING: &str = "session.mcap";
 /// The film of a recording's session, beside it.
 pub(crate) fn scene_of(record: &Path) -> PathBuf {
-    record.with_extension("scene.mcap")
+    record.with_extension("scene")
 }
 
 /// Largest number of letters of a session's name in the name of its folder.
