@@ -19,7 +19,8 @@ const MARKS: [(&str, &str); 7] = [
 ];
 
 fn main() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/measurements");
+    let folder =
+        PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo says where")).join("../../fixtures/measurements");
     println!("cargo::rerun-if-changed={}", folder.display());
     let mut tables: Vec<PathBuf> = fs::read_dir(&folder)
         .unwrap_or_else(|fault| panic!("{}: {fault}", folder.display()))

@@ -96,12 +96,22 @@ struct Chart {
 impl Chart {
     /// Points at three places and looks where the tool is.
     fn of(person: &Person) -> Self {
-        let at = |x: f32, y: f32| {
+        let at = |x: f32, y: f32, away: &[Vec3]| {
             person.points([MIDDLE[0] + x, MIDDLE[1] + y]);
-            person.rests(1.5);
+            person.waits_for("the tool at the pointer", || {
+                let before = person.tick();
+                person.rests(1.0);
+                let now = person.tick();
+                let place = now.proxy.translation;
+                let is_at_rest =
+                    now.time_ms > before.time_ms + 300.0 && place.distance(before.proxy.translation) < 0.05;
+                is_at_rest && away.iter().all(|other| other.distance(place) > 2.0)
+            });
             person.tick().proxy.translation
         };
-        let (middle, right, down) = (at(0.0, 0.0), at(40.0, 0.0), at(0.0, 40.0));
+        let middle = at(0.0, 0.0, &[]);
+        let right = at(40.0, 0.0, &[middle]);
+        let down = at(0.0, 40.0, &[middle, right]);
         let normal = (down - middle).cross(right - middle).normalize();
         let plane = Quat::from_rotation_arc(Vec3::Z, normal).inverse();
         let way = |to: Vec3| (plane * (to - middle)).truncate() / 40.0;
@@ -131,8 +141,12 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     person.waits_for_session(1);
     let chart = Chart::of(&person);
     let rim = |turn: f32| 0.5 * FLAP_MM * Vec2::from_angle(turn);
-    person.points(chart.pixel(rim(0.0)));
-    person.rests(1.5);
+    let goes_to_the_rim = || {
+        person.points(chart.pixel(rim(0.0)));
+        person.waits_for("the tool at the rim", || chart.tip(&person).distance(rim(0.0)) < 1.5);
+        person.rests(1.0);
+    };
+    goes_to_the_rim();
     // Through the bone, then the width of the drill.
     for words in ["a hole", "a wide hole"] {
         person.does("mousedown 1");
@@ -144,8 +158,7 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     }
     person.clicks(CRANIOTOME);
     person.waits_for("the craniotome", || person.tick().tool == 3);
-    person.points(chart.pixel(rim(0.0)));
-    person.rests(1.5);
+    goes_to_the_rim();
     person.does("mousedown 1");
     person.rests(3.0);
     eprintln!("inserted at {:.0} s: brain {:.1} mm", person.tick().time_ms * 1e-3, person.tick().brain_distance_mm);
