@@ -10,7 +10,7 @@ use crate::{NodalContact, PlaneContact};
 use core::ops::{Deref, DerefMut};
 
 /// Most springs on one body: the places under a tool's tip, its shaft, and what touches a fold.
-pub const MAX_SPRINGS: usize = 256;
+pub const MAX_SPRINGS: usize = 512;
 /// Most planes on one body: one for each border node near a wall.
 pub const MAX_PLANES: usize = 8192;
 
@@ -63,6 +63,11 @@ impl NodalContacts {
         self.springs.clear();
         self.planes.clear();
         self.overflow = 0;
+    }
+
+    /// Moves each spring with its tool by a time, ms: the tool goes on between two collision results.
+    pub fn follow_tool(&mut self, dt_ms: f32) {
+        self.springs.iter_mut().for_each(|spring| spring.offset_mm -= dt_ms * spring.tool_normal_velocity);
     }
 
     /// Becomes what `other` is.

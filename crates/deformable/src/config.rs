@@ -15,15 +15,18 @@ pub struct Config {
     /// Edge of a grid cell, mm, for the methods with a grid; `None` takes 1.45 x the mean edge of
     /// the mesh.
     pub cell_mm: Option<f32>,
-    /// Contact spring between tool and tissue, N/mm. Higher feels harder.
+    /// Contact of responses that have one spring for all places, N/mm.
     pub stiffness: f32,
+    /// Stiffness of the contact for each mm² of surface, N/mm: pressure for each mm that a place is
+    /// in the tool. Higher lets less of the tool in, and makes it jitter in motion.
+    pub stiffness_per_mm2: f32,
     /// Contact damper along the normal, N ms/mm.
     pub damping: f32,
-    /// Coulomb friction between tool and tissue, 0 to 2. More drags the tissue along before the
-    /// tool slips; 0 is frictionless, as on a wet brain.
+    /// Coulomb friction between tool and tissue at each place, 0 to 2, by [`Response::Ball`] only.
+    /// More drags the tissue along before the tool slips; 0 is frictionless.
     pub friction: f32,
-    /// Whether the tool's shaft touches too. Costs little until it comes near the tissue, then up
-    /// to a few tip contacts.
+    /// Whether the tool's shaft touches too, by [`Response::Ball`] only. Costs little until it
+    /// comes near the tissue.
     pub shaft: bool,
 }
 
@@ -36,6 +39,7 @@ impl Default for Config {
             cell_mm: None,
             // Numerical: the coupling between hand and tissue, not the tissue.
             stiffness: 0.3,
+            stiffness_per_mm2: 0.1,
             damping: 0.3,
             friction: 0.0,
             shaft: false,
@@ -90,6 +94,7 @@ impl Config {
             |field, value: f32| must(field, value.into(), "finite and above 0", value.is_finite() && value > 0.0);
         positive("tool.tip_radius_mm", tip_radius_mm)?;
         positive("stiffness", self.stiffness)?;
+        positive("stiffness_per_mm2", self.stiffness_per_mm2)?;
         self.cell_mm.map_or(Ok(()), |cell_mm| positive("cell_mm", cell_mm))?;
         let damped = self.damping.is_finite() && self.damping >= 0.0;
         must("damping", self.damping.into(), "finite and 0 or more", damped)?;

@@ -1,7 +1,7 @@
 //! The methods of this crate.
 
 use crate::method::{Descriptor, Method, Response};
-use crate::response::{Ball, Respond, Spring};
+use crate::response::{Ball, Respond};
 use crate::rivals::parry_tree;
 use crate::rivals::printed::Faces;
 use crate::rivals::{aabb, bottom_up_tree, brute, bsp_tree, hashed_grid, hybrid_tree, image_space, interest_matrix};
@@ -44,10 +44,10 @@ impl Method {
     }
 }
 
-/// The response for a mesh of so many nodes.
-pub(crate) fn responder(response: Response, nodes: usize, spring: Spring) -> Box<dyn Respond> {
+/// Makes a response.
+pub(crate) fn responder(response: Response) -> Box<dyn Respond> {
     match response {
-        Response::Ball => Box::new(Ball::on_nodes(nodes, spring)),
+        Response::Ball => Box::new(Ball::new()),
         Response::Printed => Box::new(Faces { nearest: false }),
         Response::NearestFace => Box::new(Faces { nearest: true }),
     }

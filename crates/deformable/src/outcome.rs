@@ -1,29 +1,22 @@
 //! What one collision step found.
 
-use trepan_contact::{Contact, ContactManifold, NodalContact, NodalContacts, SurfacePatch};
+use trepan_contact::{ContactManifold, NodalContact, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 
 /// What one step found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TissueStep {
-    /// The contact, as force models read it.
+    /// How deep the tip's ball is in the tissue, and along which normal; at rest little more than
+    /// nothing, since the tissue gives way.
     pub manifold: ContactManifold,
-    /// The tangent plane that the haptic tick holds on to until the next result.
+    /// Force of all that presses, which the haptic tick holds on to until the next result.
     pub patch: SurfacePatch,
     /// The spring that presses on the tissue's nodes, equal and opposite; where there are
-    /// `surface_springs`, the one that stands for all of them.
+    /// `surface_springs`, those count.
     pub nodal: NodalContact,
-    /// Springs under the ball, one for each node, together as strong as `nodal`. Each presses along
-    /// its own normal as deep as the ball is there, so that tissue finer than the ball takes its
-    /// shape. Empty where the response has one spring for all.
+    /// Springs near the tool, one for each node, with friction, along the force of the tool on it;
+    /// those around the contact wait. Empty where the response has one spring for all.
     pub surface_springs: NodalContacts,
-    /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights
-    /// of `nodal`.
-    pub friction_n: Vec3,
-    /// The contact of the tool's shaft; depth 0 when it is free or not asked for.
-    pub shaft: Contact,
-    /// The spring with which the shaft presses on the tissue's nodes.
-    pub shaft_nodal: NodalContact,
     /// Tool points inside the tissue.
     pub points_in_contact: u32,
     /// Exact tests of a point in a tetrahedron.
@@ -46,9 +39,6 @@ impl Default for TissueStep {
             patch: SurfacePatch::default(),
             nodal: NodalContact::none(),
             surface_springs: NodalContacts::with_room(),
-            friction_n: Vec3::ZERO,
-            shaft: Contact::default(),
-            shaft_nodal: NodalContact::none(),
             points_in_contact: 0,
             tests: 0,
             overflow: 0,
@@ -64,45 +54,27 @@ impl TissueStep {
         self.manifold.clear();
         self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
         self.nodal = NodalContact::none();
-        self.friction_n = Vec3::ZERO;
     }
 
-    /// The springs of tip and shaft.
-    fn all(&self) -> impl Iterator<Item = &NodalContact> {
-        let tip =
-            if self.surface_springs.is_empty() { core::slice::from_ref(&self.nodal) } else { &self.surface_springs };
-        tip.iter().chain([&self.shaft_nodal])
+    /// The springs that press.
+    fn all(&self) -> &[NodalContact] {
+        if self.surface_springs.is_empty() { core::slice::from_ref(&self.nodal) } else { &self.surface_springs }
     }
 
-    /// Adds the springs of tip and shaft to a solver's list, and that of friction.
+    /// Adds the springs to a solver's list.
     pub fn springs(&self, out: &mut NodalContacts) {
-        self.all().for_each(|spring| out.push(*spring));
-        out.push(self.friction_spring());
+        self.all().iter().for_each(|spring| out.push(*spring));
     }
 
-    /// The spring across the normal that holds the tissue to the tool: as stiff as the contact, and
-    /// stretched by the slip. Nothing without friction.
-    fn friction_spring(&self) -> NodalContact {
-        let Some(normal) = self.friction_n.try_normalize() else { return NodalContact::none() };
-        let mut spring = self.nodal;
-        (spring.normal, spring.damping, spring.lateral_damping) = (normal, 0.0, 0.0);
-        spring.offset_mm = self.patch.slip_mm.length() - self.manifold.point.dot(normal);
-        spring
-    }
-
-    /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force
-    /// on the tool, equal and opposite.
+    /// Adds all forces on the nodes, N. Returns the force on the tool, equal and opposite.
     pub fn push(&self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) -> Vec3 {
         let mut on_tool = Vec3::ZERO;
-        let mut press = |nodal: &NodalContact, force: Vec3| {
-            nodal.nodes().for_each(|(node, weight)| forces[node as usize] -= weight * force);
-            on_tool += force;
-        };
         for spring in self.all() {
             let (place, velocity) = (spring.mean(|n| positions[n as usize]), spring.mean(|n| velocities[n as usize]));
-            press(spring, spring.pressure_n(place, velocity) * spring.normal);
+            let force = spring.pressure_n(place, velocity) * spring.normal;
+            spring.nodes().for_each(|(node, weight)| forces[node as usize] -= weight * force);
+            on_tool += force;
         }
-        press(&self.nodal, self.friction_n);
         on_tool
     }
 }

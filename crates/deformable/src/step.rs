@@ -2,13 +2,14 @@
 
 use crate::config::{Config, ConfigError};
 use crate::list::responder;
+use crate::method::Response;
 use crate::narrow::{Hits, NONE};
 use crate::outcome::TissueStep;
-use crate::response::{Answer, Friction, Respond, Shaft, Spring};
+use crate::response::{Foundation, Law, Respond, Spring};
 use crate::scene::Scene;
 use crate::seam::{Search, SearchInputs};
 use crate::surface::MovingSurface;
-use trepan_contact::{Contact, NodalContact, SurfacePatch};
+use trepan_contact::SurfacePatch;
 use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::{TetMesh, Topology};
 
@@ -28,9 +29,7 @@ pub struct TissueCollision {
     uses_surface: bool,
     hits: Hits,
     spring: Spring,
-    friction: Friction,
-    friction_coefficient: f32,
-    shaft: Option<Shaft>,
+    foundation: Option<Foundation>,
 }
 
 impl TissueCollision {
@@ -45,9 +44,12 @@ impl TissueCollision {
         let count = shell.points.len() + 1;
         let cell_mm = config.cell_mm.unwrap_or_else(|| usual_cell_mm(mesh));
         let spring = Spring { stiffness: config.stiffness, damping: config.damping };
-        let shaft = if config.shaft { Shaft::new(tool, mesh.tets.len(), spring) } else { None };
         let method = config.method.descriptor();
-        let responder = responder(config.response.unwrap_or(method.response), mesh.positions.len(), spring);
+        let response = config.response.unwrap_or(method.response);
+        let responder = responder(response);
+        let law =
+            Law { stiffness_per_mm2: config.stiffness_per_mm2, friction: config.friction, damping: config.damping };
+        let foundation = || Foundation::new(mesh.positions.len(), tool, config.shaft, law);
         Ok(Self {
             neighbours: Topology::of(mesh).neighbours,
             tets: mesh.tets.clone(),
@@ -56,14 +58,12 @@ impl TissueCollision {
             points: vec![Vec3::ZERO; count],
             surface: MovingSurface::of(mesh),
             search: (method.build)(&SearchInputs { mesh, points: count, cell_mm }),
-            uses_surface: responder.needs_surface() || method.uses_surface || config.shaft,
+            uses_surface: responder.needs_surface() || method.uses_surface,
             responder,
             hits: Hits::with_points(count),
             shell,
             spring,
-            friction: Friction::default(),
-            friction_coefficient: config.friction,
-            shaft,
+            foundation: (response == Response::Ball).then(foundation),
         })
     }
 
@@ -95,16 +95,8 @@ impl TissueCollision {
                 true
             }
         };
-        if is_sound {
-            let answer = answer.unwrap_or(Answer { normal: Vec3::ZERO, depth_mm: 0.0 });
-            out.overflow += self.responder.press(&scene, &self.surface, &answer, &mut out.surface_springs);
-        }
-        out.patch.slip_mm = self.friction.slip(&scene, self.friction_coefficient, out);
-        out.friction_n = -out.nodal.stiffness * out.patch.slip_mm;
-        if let Some(shaft) = &mut self.shaft
-            && let Some((contact, nodal)) = shaft.respond(&scene, &mut self.surface, &mut out.overflow)
-        {
-            (out.shaft, out.shaft_nodal) = (contact, nodal);
+        if let Some(foundation) = self.foundation.as_mut().filter(|_| is_sound) {
+            foundation.press(&scene, &mut self.surface, out);
         }
         out.stale = self.surface.stale;
     }
@@ -115,8 +107,7 @@ impl TissueCollision {
         self.search.reset();
         self.responder.reset();
         self.surface.reset();
-        self.friction.reset();
-        self.shaft.iter_mut().for_each(Shaft::reset);
+        self.foundation.iter_mut().for_each(Foundation::reset);
     }
 
     fn clear(&mut self, tool: &ToolState, out: &mut TissueStep) {
@@ -124,7 +115,6 @@ impl TissueCollision {
         out.patch = SurfacePatch { time_ms: tool.time_ms, tip_mm: tool.tip(), ..SurfacePatch::default() };
         out.forget_contact();
         out.surface_springs.clear();
-        (out.shaft, out.shaft_nodal) = (Contact::default(), NodalContact::none());
         (out.points_in_contact, out.tests, out.overflow, out.skipped, out.stale) = (0, 0, 0, 0, 0);
     }
 

@@ -160,10 +160,9 @@ impl MovingSurface {
         }
     }
 
-    /// Puts the triangles whose boxes meet `region` into `near`, up to its capacity; returns how
-    /// many did not fit.
+    /// Adds the triangles whose boxes meet `region` to `near`, up to its capacity; returns how many
+    /// did not fit.
     pub(crate) fn gather(&mut self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
-        near.clear();
         let mut overflow = 0;
         let mut take = |t: u32| overflow += push_bounded(near, t);
         if self.region.holds(region) {

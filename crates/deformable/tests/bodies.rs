@@ -5,7 +5,7 @@ mod common;
 
 use common::{Random, block, deformed, tool_at};
 use glam::{Quat, Vec3};
-use trepan_contact::{NodalContact, NodalContacts, PlaneContact};
+use trepan_contact::{NodalContacts, PlaneContact, SurfacePatch};
 use trepan_deformable::{
     Config, ConfigError, MeshCollision, NodeContact, SlidingWall, TissueCollision, TissueStep, push_apart,
     push_itself_apart,
@@ -21,71 +21,79 @@ fn with(mesh: &TetMesh, config: Config) -> TissueCollision {
     TissueCollision::new(mesh, &Tool::probe(2.0), &config).expect("a sound config")
 }
 
-/// Presses a shaft of radius 1.2 mm flat on the block, its tip far out. It reads its own depth,
-/// until its axis is 3 mm under the top.
+/// Presses a shaft of radius 1.2 mm flat on a block of 32 mm that does not give way, its tip far
+/// out. For each mm of length the foundation has, with the axis h over the block and a the half
+/// width, `ε h (2 r asinh(a/h) - 2 a)`.
 #[test]
-fn a_shaft_pressed_flat_into_the_top_reads_its_depth() {
-    let mesh = block([8, 8, 6], 4.0);
-    let mut collision = with(&mesh, Config { shaft: true, ..Config::default() });
+fn a_shaft_pressed_flat_into_the_top_has_the_force_of_its_foundation() {
+    let mesh = block([16, 16, 12], 2.0);
+    let config = Config { shaft: true, ..Config::default() };
+    let mut collision = with(&mesh, config.clone());
     let (along_x, still) =
         (Quat::from_rotation_y(core::f32::consts::FRAC_PI_2), vec![Vec3::ZERO; mesh.positions.len()]);
     let mut out = TissueStep::default();
-    for k in 1..=140 {
-        let depth = 0.03 * k as f32;
+    for depth in [0.3f32, 0.6, 0.9] {
         let tip = Vec3::new(-20.0, 15.3, 24.0 + 1.2 - depth);
         collision.step(&mesh.positions, &still, &tool_at(tip, along_x), &mut out);
-        assert!(
-            !out.manifold.touches() && (out.shaft.depth_mm - depth).abs() < 1e-3,
-            "{} at {depth}",
-            out.shaft.depth_mm
-        );
-        assert!(out.shaft.normal.z > 0.99 && (out.shaft.point.y - 15.3).abs() < 4.0);
+        let (h, a) = (1.2 - depth, (1.44 - (1.2 - depth).powi(2)).sqrt());
+        let exact_n = 32.0 * config.stiffness_per_mm2 * h * (2.4 * (a / h).asinh() - 2.0 * a);
+        let SurfacePatch { force_n, normal, couple_mm, .. } = out.patch;
+        assert!((force_n / exact_n - 1.0).abs() < 0.05 && normal.z > 0.9999, "{force_n} N for {exact_n} at {depth}");
+        // The middle of the block is 36 mm from the tip along the shaft.
+        assert!((couple_mm.y / -36.0 - 1.0).abs() < 0.05 && couple_mm.x.abs() < 0.3, "{couple_mm}");
         let mut forces = still.clone();
         let on_tool = out.push(&mesh.positions, &still, &mut forces);
-        assert!(
-            (on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 && (on_tool.z - 0.3 * depth).abs() < 2e-2 * depth
-        );
+        assert!((on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 * force_n.max(1.0));
+        assert!((on_tool - normal * force_n).length() < 1e-3 * force_n);
     }
     let far = tool_at(Vec3::new(-20.0, 15.3, 30.0), along_x);
     collision.step(&mesh.positions, &still, &far, &mut out);
-    assert!(out.shaft.depth_mm == 0.0 && out.shaft_nodal.is_empty());
+    assert!(out.patch.force_n == 0.0 && out.surface_springs.is_empty());
 }
 
-/// 1 mm deep: the tool drags until `μ k d`, is carried by moving tissue, and what it feels the
-/// nodes take.
+/// 0.6 mm deep on a block that does not give way: each place drags by `ε s` until `μ p`, is carried
+/// by moving tissue, and what the tool feels the nodes take.
 #[test]
 fn friction_sticks_slips_and_is_equal_and_opposite() {
-    let mesh = block([8, 8, 4], 4.0);
-    let mut collision = with(&mesh, Config { friction: 0.4, ..Config::default() });
+    let mesh = block([16, 16, 6], 1.0);
+    let config = Config { friction: 0.4, ..Config::default() };
     let still = vec![Vec3::ZERO; mesh.positions.len()];
     let mut out = TissueStep::default();
-    for k in 0..100 {
-        let way = 0.01 * k as f32;
-        let tool = tool_at(Vec3::new(13.2 + way, 15.1, 17.0), Quat::IDENTITY);
+    let tip = Vec3::new(7.2, 8.1, 6.0 + 2.0 - 0.6);
+    let mut collision = with(&mesh, config.clone());
+    collision.step(&mesh.positions, &still, &tool_at(tip, Quat::IDENTITY), &mut out);
+    let pressed_n = out.patch.force_n;
+    assert!(out.patch.normal.z > 0.999, "no drag before it moves: {}", out.patch.normal);
+    let mut last_n = 0.0;
+    for k in 1..100 {
+        let tool = tool_at(tip + Vec3::X * (0.01 * k as f32), Quat::IDENTITY);
         collision.step(&mesh.positions, &still, &tool, &mut out);
-        let expected = -0.3 * way.min(0.4);
-        assert!((out.friction_n.x - expected).abs() < 2e-3, "{} after {way}", out.friction_n);
+        let force = out.patch.normal * out.patch.force_n;
+        if k == 1 {
+            // A circle of 1.43 mm sticks.
+            let sticks_n = config.stiffness_per_mm2 * 0.01 * core::f32::consts::PI * 2.04;
+            assert!((-force.x / sticks_n - 1.0).abs() < 0.15, "{} N for {sticks_n}", -force.x);
+        }
+        assert!(-force.x > last_n - 5e-3 && -force.x < 0.45 * pressed_n, "{force} after {last_n}");
+        last_n = -force.x;
         let mut forces = still.clone();
         let on_tool = out.push(&mesh.positions, &still, &mut forces);
-        assert!((on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 && (on_tool.z - 0.3).abs() < 1e-3);
-        // The solver's springs drag the nodes with the same force, and give way as they follow.
-        let mut springs = NodalContacts::with_room();
-        out.springs(&mut springs);
-        let drag = |by_mm: f32| {
-            let shown = |n: u32| mesh.positions[n as usize] + Vec3::X * by_mm;
-            let force = |spring: &NodalContact| -spring.pressure_n(spring.mean(shown), Vec3::ZERO) * spring.normal.x;
-            springs.iter().filter(|spring| spring.normal.x < -0.9).map(force).sum::<f32>()
-        };
-        assert!((drag(0.0) + out.friction_n.x).abs() < 1e-5, "{} of {}", drag(0.0), out.friction_n.x);
-        assert!(k < 10 || (drag(0.05) - drag(0.0) + 0.3 * 0.05).abs() < 1e-4, "{} at {k}", drag(0.05));
+        assert!((on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 && (on_tool - force).length() < 1e-3);
     }
-    collision.reset();
-    let tool = tool_at(Vec3::new(13.2, 15.1, 17.0), Quat::IDENTITY);
-    for k in 0..30 {
-        let carried = moved(&mesh, Vec3::X * (0.01 * k as f32));
-        collision.step(&carried.positions, &still, &tool, &mut out);
-        assert!((out.friction_n.x - 0.003 * k as f32).abs() < 1e-3, "{} at {k}", out.friction_n);
+    assert!(last_n > 0.3 * pressed_n, "it slips with {last_n} N of {pressed_n}");
+    // Tissue that goes along is not rubbed; it is carried back by what it was dragged before.
+    let mut collision = with(&mesh, config);
+    for k in 0..50 {
+        let by = Vec3::X * (0.02 * k as f32);
+        let body = moved(&mesh, by).positions;
+        collision.step(&body, &still, &tool_at(tip + by, Quat::IDENTITY), &mut out);
+        assert!((out.patch.normal.x * out.patch.force_n).abs() < 1e-3, "{:?} at {k}", out.patch);
     }
+    // A turning tool rubs, too.
+    let turned = tool_at(tip + Vec3::X * 0.98, Quat::from_rotation_y(0.05));
+    collision.step(&moved(&mesh, Vec3::X * 0.98).positions, &still, &turned, &mut out);
+    let force = out.patch.normal * out.patch.force_n;
+    assert!(force.x > 0.03 && (out.patch.couple_mm.y + 2.0 * out.patch.normal.x).abs() < 0.1, "{force}");
 }
 
 /// Every border node of a block that sinks into another is found, no other, with its true depth;

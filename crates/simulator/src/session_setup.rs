@@ -135,7 +135,6 @@ impl SessionSetup {
             dt_ms: tick_ms,
             bone_force: bone_force(limits.coupled(BONE, tick_ms), &with, voxel_mm),
             tissue_force: limits.coupled(TISSUE, tick_ms),
-            tissue_friction: with.friction,
             guard: limits.guard(),
             opening_needed: self.operation.opening_needed,
             force_waits: self.operation.force_waits,

@@ -69,9 +69,8 @@ const NO_PATCH: SurfacePatch = SurfacePatch {
     time_ms: 0.0,
     normal: Vec3::ZERO,
     tip_mm: Vec3::ZERO,
-    depth_mm: 0.0,
+    force_n: 0.0,
     normal_velocity: 0.0,
-    slip_mm: Vec3::ZERO,
     couple_mm: Vec3::ZERO,
 };
 
@@ -240,7 +239,7 @@ fn warning_and_score_agree_on_a_touch_of_the_brain_and_exclude_a_craniotomes_foo
                     time_ms: (bench.tick + 1) as f64,
                     normal: Vec3::Z,
                     tip_mm: at(z, 0.0).tip(),
-                    depth_mm: 0.4,
+                    force_n: 0.12,
                     ..NO_PATCH
                 };
                 bench.step(take(z), Status::Fresh, &patch);
@@ -340,7 +339,7 @@ fn the_proxy_does_not_follow_a_jump_through_the_skull() {
 #[test]
 fn the_force_of_a_stale_patch_fades_and_its_ticks_are_flagged() {
     let mut bench = Bench::new(Program::Brain);
-    let patch = SurfacePatch { time_ms: 500.0, normal: Vec3::Z, tip_mm: at(0.0, 0.0).tip(), depth_mm: 4.0, ..NO_PATCH };
+    let patch = SurfacePatch { time_ms: 500.0, normal: Vec3::Z, tip_mm: at(0.0, 0.0).tip(), force_n: 1.2, ..NO_PATCH };
     let mut forces = Vec::new();
     for _ in 0..600 {
         let record = bench.step(at(0.0, 0.0), Status::Fresh, &patch);
@@ -354,11 +353,11 @@ fn the_force_of_a_stale_patch_fades_and_its_ticks_are_flagged() {
 
 #[test]
 fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
-    let patch = |ms: u64, depth_mm: f32| SurfacePatch {
+    let patch = |ms: u64, force_n: f32| SurfacePatch {
         time_ms: ms as f64,
         normal: Vec3::Z,
         tip_mm: at(1.0, 0.0).tip(),
-        depth_mm,
+        force_n,
         ..NO_PATCH
     };
     let (bone, brain) = head();
@@ -370,7 +369,7 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
     let mut last = TickRecord::default();
     for i in 0..1500u32 {
         let z = 6.0 - 0.01 * i.min(500) as f32;
-        let soft = SurfacePatch { tip_mm: last.proxy.translation, ..patch(bench.tick + 1, 0.5) };
+        let soft = SurfacePatch { tip_mm: last.proxy.translation, ..patch(bench.tick + 1, 0.15) };
         last = bench.step(probe(z), Status::Fresh, &soft);
     }
     assert!(last.wrench.force.length() > 1.0 && last.depth_mm > 0.5, "no bone is felt: {last:?}");

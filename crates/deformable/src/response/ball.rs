@@ -30,8 +30,7 @@
 //! sharply that one normal says nothing.
 
 use super::{
-    Answer, Respond, Spring,
-    foundation::{Foundation, WAITING},
+    Answer, Respond,
     near::{Near, Sample},
 };
 use crate::{
@@ -41,7 +40,7 @@ use crate::{
     scene::Scene,
     surface::{Foot, MovingSurface},
 };
-use trepan_contact::{Contact, MAX_CONTACTS, NodalContacts};
+use trepan_contact::{Contact, MAX_CONTACTS};
 use trepan_geometry::{Aabb, Vec3};
 
 /// The triangle touched last, and room for those near the contact.
@@ -50,7 +49,6 @@ pub(crate) struct Ball {
     last_centre: Vec3,
     numbers: Vec<u32>,
     near: Near,
-    foundation: Foundation,
 }
 
 /// Most triangles near one contact.
@@ -64,14 +62,9 @@ const SAMPLE_EVERY: usize = 4;
 const BLEND: f32 = 0.5;
 
 impl Ball {
-    pub(crate) fn on_nodes(nodes: usize, spring: Spring) -> Self {
-        Self {
-            anchor: NONE,
-            last_centre: Vec3::ZERO,
-            numbers: Vec::with_capacity(MAX_NEAR),
-            near: Near::with_capacity(MAX_NEAR),
-            foundation: Foundation::on_nodes(nodes, spring),
-        }
+    pub(crate) fn new() -> Self {
+        let (numbers, near) = (Vec::with_capacity(MAX_NEAR), Near::with_capacity(MAX_NEAR));
+        Self { anchor: NONE, last_centre: Vec3::ZERO, numbers, near }
     }
 
     /// Puts load on the nodes under a sample.
@@ -82,8 +75,7 @@ impl Ball {
         }
     }
 
-    /// What the surface says about the ball's centre, and the ball's depth there, which is less
-    /// than nothing where it only comes near.
+    /// What the surface says about the ball's centre, and the ball's depth there, mm.
     fn touch(
         &mut self,
         scene: &Scene,
@@ -96,13 +88,14 @@ impl Ball {
         let jumped = self.last_centre.distance(centre) > scene.radius_mm;
         self.last_centre = centre;
         let foot = match (inside, self.anchor) {
-            (false, _) => surface.closest_here(positions, centre, (1.0 + WAITING) * scene.radius_mm),
+            (false, _) => surface.closest_here(positions, centre, scene.radius_mm),
             (true, NONE) => surface.closest(positions, centre),
             (true, _) if jumped => surface.closest(positions, centre),
             (true, anchor) => surface.descend(positions, anchor, centre),
         }?;
         let signed = |distance: f32| scene.radius_mm + if inside { distance } else { -distance };
         let region = self.region(scene, hits, &foot, signed(foot.distance2.sqrt()));
+        self.numbers.clear();
         out.overflow += surface.gather(positions, &region, &mut self.numbers);
         self.keep_touched_side(scene, surface, &foot);
         let sample = self.near.sample(centre, BLEND * scene.radius_mm)?;
@@ -118,7 +111,7 @@ impl Ball {
         let mut points = Extent::EMPTY;
         points_inside(hits).for_each(|i| points.grow(scene.points[i]));
         let mut region = points.widened(depth_mm.max(0.0) + blend_mm);
-        let around_mm = (foot.distance2.sqrt() + blend_mm).max((1.0 + WAITING) * scene.radius_mm);
+        let around_mm = foot.distance2.sqrt() + blend_mm;
         region.merge(&Extent::of(&[scene.tool.tip()]).widened(around_mm));
         region.shared(&Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm).into())
     }
@@ -143,14 +136,6 @@ impl Respond for Ball {
         self.anchor = NONE;
     }
 
-    fn press(&mut self, scene: &Scene, surface: &MovingSurface, answer: &Answer, out: &mut NodalContacts) -> u32 {
-        match self.anchor {
-            NONE => 0,
-            _ => self.foundation.press(scene, &self.near, surface, answer, out),
-        }
-    }
-
-    /// The answer is `None` when the ball does not touch, though springs may wait.
     fn respond(
         &mut self,
         scene: &Scene,

@@ -1,131 +1,259 @@
-//! The tissue's surface as an elastic foundation under the ball: how deep it is pressed at each
-//! node.
+//! The tissue's surface as an elastic foundation of the tool: each place is pressed away from the
+//! tool's exact surface.
 //!
 //! # Theory
 //! Points q with fixed weights wᵢ on the corners of their triangle cover the surface; each stands
-//! for the area A_q that it has at rest. With c the ball's centre, R its radius and m a margin, q
-//! is pressed by `e = R + m - |x_q - c|` along `n = (c - x_q)/|c - x_q|`, where e > 0:
+//! for an area A_q, the present one, and not less than that at rest. With g the distance of q from
+//! the tool, negative inside, n the direction from q to the tool's middle and ε the stiffness of
+//! the foundation:
 //!
 //! ```text
-//! fᵢ = -K Σ wᵢ A_q e n        K such that |Σ K A_q e n| is the force that the hand feels
+//! p = ε max(0, -g)      fᵢ = Σ wᵢ A_q (t - p n)      hand: F = -Σ A_q (t - p n)
+//! t ← t + ε (slip of the tool on q since the last step, across n),   |t| ≤ μ p
 //! ```
-//! Nothing in it jumps or wanders as the tissue moves: weights and areas are constants of the mesh,
-//! e is continuous, and without K the forces are the gradient of one energy. Each node is given as
-//! one spring of weight 1, with the row sums of the foundation's stiffness, twice the ball's in
-//! all. Row sums exceed the matrix that they stand for (Hughes 2000), so what solvers take
-//! implicitly is never too little.
+//! Direction and size of the force come out of the sum alone: by symmetry a ball pressed along its
+//! axis into a round block is pushed back along it. (One blended normal for all places, to which
+//! their forces are turned, tilts the force by up to 30 degrees and pushes the tissue aside until
+//! elements invert.) A stretched triangle keeps its pressure, so that the tip does not go through.
+//!
+//! Each node is given as one spring of weight 1 along its own force, with the row sum of the
+//! foundation's stiffness, `ε Σ wᵢ A_q`. Row sums exceed the matrix that they stand for (Hughes
+//! 2000), so what solvers take implicitly is never too little.
 //!
 //! # Practice
-//! Triangles larger than half a radius have several points. A ball pressed deeper than half its
-//! radius grows upwards, its lowest point fixed, so that its centre never comes down to the
-//! surface.
+//! Points are a quarter of the ball's radius apart. A ball pressed deeper than half its radius,
+//! which a hand can only do in a jump, grows upwards, its lowest point fixed, so that its centre
+//! never comes down to the surface.
 //!
 //! # Sources
-//! Elastic foundation: K. L. Johnson, Contact Mechanics, 1985, section 4.3. Row sums: T. J. R.
+//! Elastic foundation: K. L. Johnson, Contact Mechanics, 1985, section 4.3. Friction as a return to
+//! the cone: P. Wriggers, Computational Contact Mechanics, 2006, section 6.3. Row sums: T. J. R.
 //! Hughes, The Finite Element Method, 2000, section 7.3.2.
 
 use super::{
-    Answer, Spring, finite_or_zero,
-    near::{Near, NearTriangle},
+    finite_or_zero,
+    rod::{Radii, Rod},
 };
-use crate::{scene::Scene, surface::MovingSurface};
-use trepan_contact::{MAX_SPRINGS, NodalContact, NodalContacts};
-use trepan_geometry::{Quat, Vec3};
+use crate::{extent::Extent, outcome::TissueStep, scene::Scene, surface::MovingSurface};
+use trepan_contact::{MAX_SPRINGS, NodalContact, NodalContacts, SurfacePatch};
+use trepan_geometry::{Aabb, Pose, Tool, Vec3};
 
-/// The springs of the nodes near the ball.
+/// The springs of the nodes near the tool, and where tool and tissue hold each other.
 pub(crate) struct Foundation {
-    spring: Spring,
+    law: Law,
+    radii: Radii,
     springs: Vec<NodeSpring>,
     /// The spring of each node, or [`NONE`].
     spring_of: Vec<u32>,
+    numbers: Vec<u32>,
+    /// Places pressed now and in the last step, in the order of triangles and points.
+    grips: [Vec<Grip>; 2],
+    /// The tool's pose in the last step.
+    before: Option<Pose>,
+}
+
+/// How places are pressed.
+#[derive(Clone, Copy)]
+pub(crate) struct Law {
+    /// ε, N/mm³.
+    pub stiffness_per_mm2: f32,
+    /// μ.
+    pub friction: f32,
+    /// Damping of all places together, N ms/mm.
+    pub damping: f32,
 }
 
 /// Sums over the points around one node.
 #[derive(Default)]
 struct NodeSpring {
     node: u32,
-    /// Sum of `w A e n` of what is pressed, mm³.
-    push: Vec3,
-    /// Sums of `w A n` and of `w A e`, pressed or not: mm² and mm³.
+    /// Force on the node, N.
+    force: Vec3,
+    /// Sums of `w A n` and of `w A g`, pressed or not: mm² and mm³.
     normal: Vec3,
-    depth_mm3: f32,
+    gap_mm3: f32,
     area_mm2: f32,
 }
 
-/// How far around the ball springs wait for tissue, radii.
-pub(crate) const WAITING: f32 = 0.25;
-/// Margin m around a ball that touches, radii.
-const MARGIN: f32 = 0.1;
+/// A place in contact: its triangle and point, where it was, mm, and the drag on the tissue, MPa.
+#[derive(Clone, Copy)]
+struct Grip {
+    at: [u32; 2],
+    place: Vec3,
+    drag: Vec3,
+}
+
+/// One step over the surface.
+struct Pass<'a> {
+    scene: &'a Scene<'a>,
+    rod: Rod,
+    /// Normal of the touched surface, zero where the ball touches none.
+    touched: Vec3,
+    /// Distance from the tool within which springs wait.
+    waiting_mm: f32,
+    /// The first grip of the last step that was not passed yet.
+    last: usize,
+    felt: Felt,
+}
+
+/// What the tool feels.
+#[derive(Default)]
+struct Felt {
+    force: Vec3,
+    /// About the tip, N mm.
+    moment: Vec3,
+}
+
+impl Felt {
+    fn add(&mut self, force: Vec3, arm: Vec3) {
+        self.force += force;
+        self.moment += arm.cross(force);
+    }
+}
+
+impl Pass<'_> {
+    /// Corners of a triangle that comes near and faces the tool, its points along an edge, and the
+    /// area of each, mm².
+    fn meets(&self, surface: &MovingSurface, number: u32) -> Option<([Vec3; 3], u32, f32)> {
+        let corners = surface.corners(self.scene.positions, number);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let width = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f32::max).sqrt();
+        let (gap_mm, inwards) = self.rod.gap(middle);
+        let twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let faces = twice_area.dot(inwards) > 0.0 || twice_area.dot(self.touched) > SAME_SIDE * twice_area.length();
+        let rest_mm2 = surface.rest_area_mm2[number as usize];
+        let along = ((2.0 * rest_mm2).sqrt() / (SPACING * self.scene.radius_mm)).ceil();
+        let along = along.clamp(1.0, MOST_ALONG as f32) as u32;
+        let area_mm2 = rest_mm2.max(0.5 * twice_area.length()) / (along * along) as f32;
+        (gap_mm < self.waiting_mm + width && faces).then_some((corners, along, area_mm2))
+    }
+}
+
+/// How far around the tool springs wait for tissue, radii of its tip.
+pub(super) const WAITING: f32 = 0.25;
 /// Depth from which the ball grows, radii.
 const GROWS: f32 = 0.5;
 /// Widest spacing of points, radii.
-const SPACING: f32 = 0.5;
+const SPACING: f32 = 0.25;
 /// Most points along an edge.
 const MOST_ALONG: u32 = 8;
 /// How late the foundation follows the nodes, ms.
 const LATE_MS: f32 = 1.0;
+/// Most triangles near the tool, and most places in contact; others have no friction.
+const MAX_NEAR: usize = 4096;
+const MAX_GRIPS: usize = 16_384;
 /// No spring yet.
 const NONE: u32 = u32::MAX;
 
 impl Foundation {
-    pub(crate) fn on_nodes(nodes: usize, spring: Spring) -> Self {
-        Self { spring, springs: Vec::with_capacity(MAX_SPRINGS), spring_of: vec![NONE; nodes] }
+    pub(crate) fn new(nodes: usize, tool: &Tool, with_shaft: bool, law: Law) -> Self {
+        Self {
+            law,
+            radii: Radii::of(tool, with_shaft),
+            springs: Vec::with_capacity(MAX_SPRINGS),
+            spring_of: vec![NONE; nodes],
+            numbers: Vec::with_capacity(MAX_NEAR),
+            grips: [Vec::with_capacity(MAX_GRIPS), Vec::with_capacity(MAX_GRIPS)],
+            before: None,
+        }
     }
 
-    /// Writes the springs of the ball on the triangles near it. Together they have the force of
-    /// the ball's spring pressed as the answer says; at depth 0 all wait. Returns how many nodes
-    /// did not fit.
-    pub(crate) fn press(
-        &mut self,
-        scene: &Scene,
-        near: &Near,
-        surface: &MovingSurface,
-        &Answer { normal, depth_mm }: &Answer,
-        out: &mut NodalContacts,
-    ) -> u32 {
-        let grown_mm = (depth_mm - GROWS * scene.radius_mm).max(0.0);
-        let margin_mm = if depth_mm > 0.0 { MARGIN * scene.radius_mm } else { 0.0 };
-        let ball = Ball {
-            centre: scene.tool.tip() + grown_mm * normal,
-            reach_mm: scene.radius_mm + grown_mm + margin_mm,
-            waiting_mm: (1.0 + WAITING) * scene.radius_mm + grown_mm,
-        };
-        let mut overflow = 0;
+    /// Forgets where tool and tissue held each other.
+    pub(crate) fn reset(&mut self) {
+        self.grips.iter_mut().for_each(Vec::clear);
+        self.before = None;
+    }
+
+    /// Writes the springs of the surface near the tool, and what the hand feels of them. `out`
+    /// holds the depth of the ball along one normal, if it touches.
+    pub(crate) fn press(&mut self, scene: &Scene, surface: &mut MovingSurface, out: &mut TissueStep) {
+        let (touched, depth_mm) = (out.manifold.normal, out.manifold.depth_mm);
+        let rod = self.radii.at(scene.tool, touched * (depth_mm - GROWS * scene.radius_mm).max(0.0));
+        let mut pass =
+            Pass { scene, rod, touched, waiting_mm: WAITING * scene.radius_mm, last: 0, felt: Felt::default() };
         self.springs.clear();
-        for triangle in near.within(ball.centre, ball.waiting_mm) {
-            overflow += self.sum(&ball, triangle, surface, scene.radius_mm);
+        self.grips.swap(0, 1);
+        self.grips[0].clear();
+        out.overflow += self.gather(&pass, surface);
+        for at in 0..self.numbers.len() {
+            out.overflow += self.sum(&mut pass, surface, self.numbers[at]);
         }
         self.springs.iter().for_each(|spring| self.spring_of[spring.node as usize] = NONE);
-        self.write(scene, normal * depth_mm, out);
+        self.before = Some(scene.tool.world_from_tool);
+        self.write(scene, &mut out.surface_springs);
+        if !out.surface_springs.is_empty() {
+            self.feel(scene, &pass.felt, out);
+        }
+    }
+
+    /// Lists the triangles near the tool, each once, in order; returns how many did not fit.
+    fn gather(&mut self, pass: &Pass, surface: &mut MovingSurface) -> u32 {
+        let mut overflow = 0;
+        self.numbers.clear();
+        for (middle, half) in pass.rod.boxes(pass.waiting_mm) {
+            let region: Extent = Aabb::of_sphere(middle, half).into();
+            if region.overlaps(&surface.bounds) {
+                overflow += surface.gather(pass.scene.positions, &region, &mut self.numbers);
+            }
+        }
+        self.numbers.sort_unstable();
+        self.numbers.dedup();
         overflow
     }
 
     /// Adds the points of a triangle; returns how many of its nodes did not fit.
-    fn sum(&mut self, ball: &Ball, triangle: &NearTriangle, surface: &MovingSurface, radius_mm: f32) -> u32 {
-        let area_mm2 = surface.rest_area_mm2[triangle.number as usize];
-        let along = ((2.0 * area_mm2).sqrt() / (SPACING * radius_mm)).ceil().clamp(1.0, MOST_ALONG as f32) as u32;
-        let area_mm2 = area_mm2 / (along * along) as f32;
+    fn sum(&mut self, pass: &mut Pass, surface: &MovingSurface, number: u32) -> u32 {
+        let Some((corners, along, area_mm2)) = pass.meets(surface, number) else { return 0 };
         let mut overflow = 0;
-        for weights in points(along) {
-            let away = ball.centre - triangle.point(weights);
-            let distance = away.length();
-            if !(distance > f32::MIN_POSITIVE && distance < ball.waiting_mm) {
+        for (k, weights) in points(along).enumerate() {
+            let place = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+            let (gap_mm, inwards) = pass.rod.gap(place);
+            if gap_mm.is_nan() || gap_mm >= pass.waiting_mm {
                 continue;
             }
-            let (normal, depth_mm) = (away / distance, ball.reach_mm - distance);
-            for (&node, weight) in surface.triangles[triangle.number as usize].iter().zip(weights) {
+            let mut force = Vec3::ZERO;
+            if gap_mm < 0.0 {
+                let pressure = -gap_mm * self.law.stiffness_per_mm2;
+                let drag = self.drag(pass, [number, k as u32], place, inwards, pressure);
+                force = (drag - pressure * inwards) * area_mm2;
+                pass.felt.add(-force, place - pass.scene.tool.tip());
+            }
+            for (&node, weight) in surface.triangles[number as usize].iter().zip(weights) {
                 let Some(spring) = self.spring(node) else {
                     overflow += 1;
                     continue;
                 };
                 let area_mm2 = weight * area_mm2;
-                spring.push += normal * (area_mm2 * depth_mm.max(0.0));
-                spring.normal += normal * area_mm2;
-                spring.depth_mm3 += area_mm2 * depth_mm;
+                spring.force += weight * force;
+                spring.normal += inwards * area_mm2;
+                spring.gap_mm3 += area_mm2 * gap_mm;
                 spring.area_mm2 += area_mm2;
             }
         }
         overflow
+    }
+
+    /// Drag of the tool on a pressed place, MPa, which is kept for the next step.
+    fn drag(&mut self, pass: &mut Pass, at: [u32; 2], place: Vec3, normal: Vec3, pressure: f32) -> Vec3 {
+        if self.law.friction <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let [now, old] = &mut self.grips;
+        while old.get(pass.last).is_some_and(|grip| grip.at < at) {
+            pass.last += 1;
+        }
+        let held = old.get(pass.last).filter(|grip| grip.at == at);
+        let drag = held.zip(self.before).map_or(Vec3::ZERO, |(grip, before)| {
+            let on_tool = before.rotation.inverse() * (grip.place - before.translation);
+            let slip = pass.scene.tool.world_from_tool * on_tool - place;
+            let drag = (grip.drag + slip * self.law.stiffness_per_mm2).reject_from_normalized(normal);
+            drag.clamp_length_max(self.law.friction * pressure)
+        });
+        let drag = if drag.is_finite() { drag } else { Vec3::ZERO };
+        if now.len() < MAX_GRIPS {
+            now.push(Grip { at, place, drag });
+        }
+        drag
     }
 
     /// The spring of a node; `None` when there is no room for it.
@@ -138,50 +266,52 @@ impl Foundation {
         self.springs.get_mut(*at as usize)
     }
 
-    /// Scales the sums to the ball's `depth`, along its normal, mm, and turns them to that normal.
-    fn write(&self, scene: &Scene, depth: Vec3, out: &mut NodalContacts) {
-        let spring = self.spring;
-        let push: Vec3 = self.springs.iter().map(|spring| spring.push).sum();
+    /// Writes the sums as springs.
+    fn write(&self, scene: &Scene, out: &mut NodalContacts) {
+        let Law { stiffness_per_mm2, damping, .. } = self.law;
         let area_mm2: f32 = self.springs.iter().map(|spring| spring.area_mm2).sum();
-        let pressed = depth != Vec3::ZERO && push.length() > f32::MIN_POSITIVE;
-        if depth != Vec3::ZERO && !pressed {
-            return;
-        }
-        let turn = match (pressed, depth.try_normalize(), push.try_normalize()) {
-            (true, Some(normal), Some(push)) => Quat::from_rotation_arc(push, normal),
-            _ => Quat::IDENTITY,
-        };
-        let modulus = if pressed { spring.stiffness * depth.length() / push.length() } else { 0.0 };
         let velocity: Vec3 =
             self.springs.iter().map(|sums| scene.velocities[sums.node as usize] * (sums.area_mm2 / area_mm2)).sum();
         for sums in &self.springs {
-            let share = sums.area_mm2 / area_mm2;
-            let force_n = modulus * sums.push.length();
-            let along = if force_n > 0.0 { turn * sums.push } else { sums.normal };
-            let stiffness = 2.0 * spring.stiffness * share;
+            let stiffness = stiffness_per_mm2 * sums.area_mm2;
             let place = scene.positions[sums.node as usize];
             let mut contact = NodalContact::none();
             contact.add(sums.node, 1.0);
-            contact.normal = along.normalize_or_zero();
-            let depth_mm = if force_n > 0.0 { force_n / stiffness } else { sums.depth_mm3.min(0.0) / sums.area_mm2 };
-            contact.offset_mm = depth_mm - place.dot(contact.normal);
-            (contact.stiffness, contact.damping) = (stiffness, spring.damping * share);
-            contact.tool_normal_velocity = finite_or_zero(scene.tool.velocity_at(place).dot(contact.normal));
+            let (normal, depth_mm) = match -sums.force {
+                Vec3::ZERO => (sums.normal.normalize_or_zero(), -sums.gap_mm3.max(0.0) / sums.area_mm2),
+                force => (force.normalize_or_zero(), force.length() / stiffness),
+            };
+            contact.normal = normal;
+            contact.offset_mm = depth_mm - place.dot(normal);
+            (contact.stiffness, contact.damping) = (stiffness, damping * sums.area_mm2 / area_mm2);
+            contact.tool_normal_velocity = finite_or_zero(scene.tool.velocity_at(place).dot(normal));
             contact.lateral_damping = LATE_MS * stiffness;
             contact.lateral_velocity = velocity;
             out.push(contact);
         }
     }
+
+    /// Gives the hand the sum of what presses.
+    fn feel(&self, scene: &Scene, felt: &Felt, out: &mut TissueStep) {
+        let (time_ms, tip_mm) = (scene.tool.time_ms, scene.tool.tip());
+        out.patch = SurfacePatch { time_ms, tip_mm, ..SurfacePatch::default() };
+        let Some(normal) = felt.force.try_normalize() else { return };
+        let force_n = felt.force.length();
+        let speed = |sums: &NodeSpring| scene.velocities[sums.node as usize].dot(normal) * sums.force.length();
+        let (speeds, total) = self
+            .springs
+            .iter()
+            .fold((0.0, 0.0), |(speeds, total), sums| (speeds + speed(sums), total + sums.force.length()));
+        out.patch.normal = normal;
+        out.patch.force_n = force_n;
+        out.patch.couple_mm = felt.moment / force_n;
+        out.patch.normal_velocity = finite_or_zero(speeds / total);
+    }
 }
 
-/// The ball as the foundation meets it.
-struct Ball {
-    centre: Vec3,
-    /// From the centre, mm: nearer points are pressed.
-    reach_mm: f32,
-    /// From the centre, mm: nearer points have springs.
-    waiting_mm: f32,
-}
+/// A triangle belongs to the touched side when its normal is within 70 degrees of the touched
+/// normal.
+const SAME_SIDE: f32 = 0.34;
 
 /// Centroids of a triangle split into `along²` equal ones, as weights on its corners.
 fn points(along: u32) -> impl Iterator<Item = [f32; 3]> {

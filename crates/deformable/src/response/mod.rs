@@ -2,16 +2,14 @@
 
 mod ball;
 mod foundation;
-mod friction;
 mod near;
-mod shaft;
+mod rod;
 
 pub(crate) use ball::Ball;
-pub(crate) use friction::Friction;
-pub(crate) use shaft::Shaft;
+pub(crate) use foundation::{Foundation, Law};
 
 use crate::{narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
-use trepan_contact::{NodalContact, NodalContacts, SurfacePatch};
+use trepan_contact::{NodalContact, SurfacePatch};
 use trepan_geometry::Vec3;
 
 /// A response with its memory.
@@ -30,13 +28,6 @@ pub(crate) trait Respond: Send {
         surface: &mut MovingSurface,
         out: &mut TissueStep,
     ) -> Option<Answer>;
-
-    /// Writes the springs of the surface under the tool, if the response has any. Together they
-    /// have the force of the spring pressed as the answer says, and wait where its depth is 0.
-    /// Returns what did not fit.
-    fn press(&mut self, _: &Scene, _: &MovingSurface, _: &Answer, _: &mut NodalContacts) -> u32 {
-        0
-    }
 
     /// Forgets what was touched.
     fn reset(&mut self) {}
@@ -88,8 +79,8 @@ impl Spring {
         let velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(normal);
         (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (normal, depth_mm, place);
         let (time_ms, tip_mm) = (scene.tool.time_ms, scene.tool.tip());
-        let normal_velocity = finite_or_zero(velocity);
-        out.patch = SurfacePatch { time_ms, normal, tip_mm, depth_mm, normal_velocity, ..SurfacePatch::default() };
+        let (force_n, normal_velocity) = (self.stiffness * depth_mm, finite_or_zero(velocity));
+        out.patch = SurfacePatch { time_ms, normal, tip_mm, force_n, normal_velocity, ..SurfacePatch::default() };
         true
     }
 }

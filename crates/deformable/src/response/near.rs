@@ -26,8 +26,8 @@ pub(crate) struct Near {
 
 /// One moved triangle with what the bounds need.
 #[derive(Clone, Copy)]
-pub(crate) struct NearTriangle {
-    pub number: u32,
+struct NearTriangle {
+    number: u32,
     corners: [Vec3; 3],
     normal: Vec3,
     bounds: Extent,
@@ -97,11 +97,6 @@ impl Near {
         Some(Sample { triangle: triangle.number, weights, distance: nearest, normal })
     }
 
-    /// The triangles that may come within a distance of `p`.
-    pub(crate) fn within(&self, p: Vec3, reach_mm: f32) -> impl Iterator<Item = &NearTriangle> {
-        self.triangles.iter().filter(move |triangle| triangle.at_least2(p) < reach_mm * reach_mm)
-    }
-
     fn blended(&self, nearest: f32, blend_mm: f32) -> Vec3 {
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
         for &(distance, t) in &self.close {
@@ -123,7 +118,7 @@ impl NearTriangle {
     }
 
     /// The point with these weights on the corners, mm.
-    pub(crate) fn point(&self, weights: [f32; 3]) -> Vec3 {
+    fn point(&self, weights: [f32; 3]) -> Vec3 {
         self.corners[0] * weights[0] + self.corners[1] * weights[1] + self.corners[2] * weights[2]
     }
 }

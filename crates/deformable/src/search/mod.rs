@@ -7,4 +7,3 @@ pub mod walk;
 
 pub(crate) use flood::Flood;
 pub(crate) use lost::Lost;
-pub(crate) use walk::Walk;

@@ -137,6 +137,7 @@ impl Walk {
     /// Border triangles and degenerate tetrahedra in a region.
     fn seed(&mut self, region: &Extent, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         self.flood.begin();
+        self.near.clear();
         hits.overflow += surface.gather(scene.positions, region, &mut self.near);
         for &t in &self.near {
             self.flood.reach(surface.tet_of_triangle[t as usize], hits);

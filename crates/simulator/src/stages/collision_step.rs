@@ -23,9 +23,10 @@ impl CollisionStage {
     /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
-        let shaft = self.step.shaft;
-        let arm_mm = if self.with_torque { shaft.point - sample.state.tip() } else { Vec3::ZERO };
-        self.patch = self.step.patch.with(shaft.normal, shaft.depth_mm, arm_mm);
+        self.patch = self.step.patch;
+        if !self.with_torque {
+            self.patch.couple_mm = Vec3::ZERO;
+        }
         self.settling.load(sample.phase(), sample.state.time_ms, &mut self.loads);
         self.press(sample.phase(), soft);
         self.seq += 1;

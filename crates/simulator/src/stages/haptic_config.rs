@@ -31,8 +31,6 @@ pub struct HapticConfig {
     pub bone_force: Vibration<ForceShading<Friction>>,
     /// Force of tissue: k in N/mm, b in N ms/mm.
     pub tissue_force: Viscoelastic,
-    /// Friction coefficient of tissue, without unit.
-    pub tissue_friction: f32,
     /// Configuration of the force guard.
     pub guard: GuardConfig,
     /// Thresholds of the warnings.
@@ -53,7 +51,6 @@ impl HapticConfig {
             dt_ms: 1.0,
             bone_force: bone_force(BONE, &Ingredients::default(), 0.0),
             tissue_force: TISSUE,
-            tissue_friction: 0.0,
             guard: GuardConfig::default(),
             limits: Limits::default(),
             opening_needed: true,

@@ -173,8 +173,6 @@ pub struct HapticStage {
     rigid: Vec<Option<Box<dyn RigidContact>>>,
     bone_step: RigidStep,
     tissue: ContactManifold,
-    /// Slip of the tool on the tissue, mm.
-    slip_mm: Vec3,
     guard: ForceGuard,
     watch: Watch,
     scores: ScoreKeeper,
@@ -222,7 +220,6 @@ impl HapticStage {
             forbidden: None,
             bone_step: RigidStep::default(),
             tissue: ContactManifold::default(),
-            slip_mm: Vec3::ZERO,
             watch: Watch::default(),
             scores,
             last_valid: start,
@@ -349,7 +346,7 @@ impl HapticStage {
     fn touch_tissue(&mut self, patch: &SurfacePatch, sample: &ToolSample) -> bool {
         self.tissue.clear();
         let age_ms = (sample.state.time_ms - patch.time_ms) as f32;
-        let depth = patch.depth_at(sample.state.tip());
+        let depth = patch.depth_at(sample.state.tip(), self.config.tissue_force.stiffness);
         if depth <= 0.0 || !patch.normal.is_finite() {
             return false;
         }
@@ -358,7 +355,6 @@ impl HapticStage {
         self.tissue.point = sample.state.tip() - self.tool().tip_radius_mm * patch.normal;
         self.tissue.depth_mm = depth * share;
         self.tissue.couple_mm = patch.couple_mm;
-        self.slip_mm = patch.slip_at(sample.state.tip());
         age_ms > FRESH_MS
     }
 
@@ -371,18 +367,7 @@ impl HapticStage {
         let bone = self.config.bone_force.wrench(tool, &self.bone_step.manifold, dt_ms);
         let brain = self.phase() == Phase::Brain;
         let tissue = brain.then(|| self.config.tissue_force.wrench(tool, &self.tissue, dt_ms));
-        DesiredWrench { bone, tissue: tissue.map(|pressed| self.with_friction(tool, pressed)) }
-    }
-
-    /// Adds the friction of tissue to the wrench that presses on the tool.
-    fn with_friction(&self, tool: &ToolState, pressed: Wrench) -> Wrench {
-        let HapticConfig { tissue_friction, tissue_force, .. } = &self.config;
-        if *tissue_friction <= 0.0 || pressed.force == Vec3::ZERO || !self.slip_mm.is_finite() {
-            return pressed;
-        }
-        let slip_mm = self.slip_mm.clamp_length_max(tissue_friction * self.tissue.depth_mm);
-        let force = -tissue_force.stiffness * slip_mm;
-        pressed + Wrench { force, torque: (self.tissue.point - tool.tip()).cross(force) }
+        DesiredWrench { bone, tissue }
     }
 
     /// Forgets what the tool held on to; no wrench.

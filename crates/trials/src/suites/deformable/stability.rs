@@ -190,7 +190,7 @@ impl Record {
         self.touching += u64::from(surely > 0);
         self.inside += surely;
         let nodal = out.nodal.offset_mm.is_finite() && out.nodal.nodes().all(|(_, w)| w.is_finite());
-        self.not_finite += u64::from(!(nodal && out.manifold.is_finite() && out.patch.depth_mm.is_finite()));
+        self.not_finite += u64::from(!(nodal && out.manifold.is_finite() && out.patch.force_n.is_finite()));
         self.overflow += u64::from(out.overflow);
         self.stale += u64::from(out.stale);
         self.skipped += u64::from(out.skipped);

@@ -14,9 +14,8 @@ const NO_PATCH: SurfacePatch = SurfacePatch {
     time_ms: 0.0,
     normal: trepan_geometry::Vec3::ZERO,
     tip_mm: trepan_geometry::Vec3::ZERO,
-    depth_mm: 0.0,
+    force_n: 0.0,
     normal_velocity: 0.0,
-    slip_mm: trepan_geometry::Vec3::ZERO,
     couple_mm: trepan_geometry::Vec3::ZERO,
 };
 

@@ -1,5 +1,6 @@
 //! Soft-tissue solvers: how right each is and what that costs, and where each fails.
 
+mod axial;
 mod classes;
 pub(super) mod closed_forms;
 mod device;
@@ -24,6 +25,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.extend(locking::parts(scope));
     parts.extend(motion::parts());
     parts.extend([Part::new("region", region::run), Part::new("device", device::run)]);
+    parts.extend(axial::parts());
     parts.extend(outside::parts());
     parts.push(Part::new("tissue classes", classes::run));
     parts.extend(slender::parts());
