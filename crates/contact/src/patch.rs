@@ -14,11 +14,13 @@
 
 use trepan_geometry::Vec3;
 
-/// A tangent plane to the tissue near the tool. Plain data, 56 bytes, copied whole between threads.
+/// A tangent plane to the tissue near the tool. Plain data, 64 bytes, copied whole between threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfacePatch {
     /// When the tool pose of this result was read, session ms.
     pub time_ms: f64,
+    /// Simulated time of the tissue in this result, ms; 0 where nobody simulates it.
+    pub tissue_ms: f64,
     /// Direction of the tissue's force on the tool, a unit vector; zero when the tool did not touch.
     pub normal: Vec3,
     /// The tip (the tool's origin) that `force_n` belongs to, world mm.

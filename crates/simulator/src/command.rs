@@ -13,7 +13,7 @@ use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, SessionsTask, Task, rate};
 use crate::printable::{columns, count, printable};
 use crate::recordings;
-use crate::report::summary::{CutOff, slow};
+use crate::report::summary::{CutOff, behind, slow};
 use crate::report::{film, sessions, ticks};
 use crate::run::Quantiles;
 use crate::session::{Ended, Place, Session};
@@ -210,7 +210,8 @@ fn report(ended: &Ended) -> ExitCode {
         count(summary.frames as usize, "picture")
     );
     if summary.replay.is_none() {
-        slow(summary.rate_hz, summary.asked_hz).iter().for_each(|slow| println!("{slow}"));
+        let behind = summary.solver.as_ref().and_then(|solver| behind(solver.outcome.real_time_factor));
+        slow(summary.rate_hz, summary.asked_hz).iter().chain(&behind).for_each(|slow| println!("{slow}"));
     }
     summary.bands.sentences().iter().for_each(|band| println!("{band}"));
     if summary.cut_off.pieces > 0 {

@@ -67,6 +67,7 @@ fn at(z: f32, speed: f32) -> ToolState {
 
 const NO_PATCH: SurfacePatch = SurfacePatch {
     time_ms: 0.0,
+    tissue_ms: 0.0,
     normal: Vec3::ZERO,
     tip_mm: Vec3::ZERO,
     force_n: 0.0,

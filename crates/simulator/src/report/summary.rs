@@ -5,6 +5,7 @@ use crate::models::ModelSummary;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
 use crate::run::{Outcome, Quantiles, Replayed, SolverOutcome};
+use crate::stages::alarms::REAL_TIME;
 use crate::stages::by_cause;
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
@@ -275,8 +276,13 @@ impl Summary {
     pub(crate) fn with(self, outcome: &Outcome) -> Self {
         let rate_hz = outcome.ticks.count as f64 / outcome.seconds.max(1e-9);
         let slow = outcome.replayed.is_none().then(|| slow(rate_hz, self.asked_hz)).flatten();
+        let behind = outcome
+            .solver
+            .iter()
+            .filter(|_| outcome.replayed.is_none())
+            .filter_map(|solver| behind(solver.real_time_factor));
         let solver_faults = outcome.solver.iter().flat_map(|solver| solver.solver_faults.remarks());
-        let remarks = slow.into_iter().chain(self.remarks).chain(outcome.remarks.iter().cloned());
+        let remarks = slow.into_iter().chain(behind).chain(self.remarks).chain(outcome.remarks.iter().cloned());
         Self {
             phases: phases(outcome),
             through_s: through_s(outcome),
@@ -321,6 +327,16 @@ pub(crate) fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
         format!(
             "SLOW: {rate_hz:.1} of {asked_hz:.0} ticks a second, forces came late: do not compare them; close programs, \
              or lower --rate-hz"
+        )
+    })
+}
+
+/// Returns a remark where the brain was slower than real time.
+pub(crate) fn behind(real_time_factor: f64) -> Option<String> {
+    (real_time_factor < f64::from(REAL_TIME)).then(|| {
+        format!(
+            "SLOW: the brain moved at {real_time_factor:.2} of real time and felt wrong: do not compare its forces; close \
+             programs, or take a lower --quality"
         )
     })
 }

@@ -50,6 +50,38 @@ impl Feed {
     }
 }
 
+/// Share of real time under which tissue counts as slow.
+pub(crate) const REAL_TIME: f32 = 0.98;
+/// Time over which the pace of tissue is taken, ms.
+const PACE_MS: f64 = 1000.0;
+
+/// Pace of the simulated tissue.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pace {
+    /// When it was last taken, and the tissue's time then, ms.
+    last_ms: Option<(f64, f64)>,
+    share: f32,
+}
+
+impl Pace {
+    /// Nothing known yet: in real time.
+    pub const UNKNOWN: Self = Self { last_ms: None, share: 1.0 };
+
+    /// Follows the tissue's time; returns that of the last second over a second. Tissue that nobody
+    /// simulates stays at 0 and keeps pace.
+    pub fn follow(&mut self, now_ms: f64, tissue_ms: f64) -> f32 {
+        if tissue_ms <= 0.0 {
+            return 1.0;
+        }
+        let (then_ms, was_ms) = *self.last_ms.get_or_insert((now_ms, tissue_ms));
+        if now_ms >= then_ms + PACE_MS {
+            self.share = ((tissue_ms - was_ms) / (now_ms - then_ms)) as f32;
+            self.last_ms = Some((now_ms, tissue_ms));
+        }
+        self.share
+    }
+}
+
 /// Inputs of the warnings that are not in a tick's record.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WarningInputs {
@@ -69,6 +101,8 @@ pub(crate) struct WarningInputs {
     pub stalled: bool,
     /// Age of the last collision result, ms.
     pub age_ms: f32,
+    /// Simulated time of the tissue over time, without unit.
+    pub tissue_pace: f32,
     /// Whether the motors are warm.
     pub warm: bool,
 }
@@ -113,6 +147,7 @@ impl WarningInputs {
             (Warning::TissueLate, record.has(TickRecord::HELD), self.age_ms),
             (Warning::DeviceStale, record.has(TickRecord::STALE), 0.0),
             (Warning::MotorsWarm, self.warm, self.desired_n),
+            (Warning::TissueSlow, self.tissue_pace < REAL_TIME, self.tissue_pace),
         ]
     }
 }
@@ -120,6 +155,17 @@ impl WarningInputs {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tissue_that_falls_behind_is_slow_within_a_second() {
+        let mut pace = Pace::UNKNOWN;
+        let mut follow = |from: u32, tissue: f64| {
+            (0..1001).map(|ms| pace.follow(f64::from(from + ms), tissue + 0.9 * f64::from(ms))).last().unwrap()
+        };
+        assert!((follow(100, 5.0) - 0.9).abs() < 1e-3);
+        let mut nobody = Pace::UNKNOWN;
+        assert!((0..3000).all(|ms| nobody.follow(f64::from(ms), 0.0) == 1.0));
+    }
 
     #[test]
     fn breakthrough_is_predicted_at_a_steady_feed_for_bone_within_reach() {

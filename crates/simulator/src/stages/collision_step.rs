@@ -23,7 +23,7 @@ impl CollisionStage {
     /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
-        self.patch = self.step.patch;
+        self.patch = SurfacePatch { tissue_ms: soft.time_ms, ..self.step.patch };
         if !self.with_torque {
             self.patch.couple_mm = Vec3::ZERO;
         }
@@ -60,6 +60,8 @@ impl CollisionStage {
 pub struct SoftFrame {
     /// Solver steps done.
     pub step: u64,
+    /// Simulated time, ms.
+    pub time_ms: f64,
     /// Node positions, mm.
     pub positions: Vec<Vec3>,
     /// Node velocities, mm/ms.
@@ -183,8 +185,12 @@ mod tests {
         let sample = ToolSample { tick: 1, state: far, tool, slot: 0, drilling: false };
         // Over 4 mm the arms lean inwards, by 5 mm at the end.
         let closed = |p: &Vec3| *p + Vec3::X * if p.z > 4.0 { (6.0 - p.x).signum() * (p.z - 4.0) * 0.35 } else { 0.0 };
-        let frame =
-            |positions: Vec<Vec3>| SoftFrame { velocities: vec![Vec3::ZERO; positions.len()], step: 1, positions };
+        let frame = |positions: Vec<Vec3>| SoftFrame {
+            velocities: vec![Vec3::ZERO; positions.len()],
+            step: 1,
+            time_ms: 1.0,
+            positions,
+        };
         let open = |folds: bool| {
             let stage = CollisionStage::new(Program::Brain, &mesh, &Config::default(), None).unwrap();
             if folds { stage.folding(&mesh).unwrap() } else { stage }

@@ -35,6 +35,8 @@ pub enum Warning {
     BrainPressed,
     /// A tool is close to a structure that must not be touched.
     ForbiddenNear,
+    /// The simulated brain is slower than real time, so that it feels softer or stiffer than it is.
+    TissueSlow,
 }
 
 /// Texts of a warning.
@@ -49,7 +51,7 @@ struct Texts {
 
 impl Warning {
     /// All warnings, in the order of their bits.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::BoneThin,
         Self::BreakThrough,
         Self::BrainNear,
@@ -62,6 +64,7 @@ impl Warning {
         Self::BreachSoon,
         Self::BrainPressed,
         Self::ForbiddenNear,
+        Self::TissueSlow,
     ];
 
     fn texts(self) -> Texts {
@@ -84,6 +87,11 @@ impl Warning {
             Self::ForbiddenNear => {
                 ("forbidden-near", "a structure that must not be touched is close: keep away", "mm away")
             }
+            Self::TissueSlow => (
+                "tissue-slow",
+                "the brain moves more slowly than in real time and feels wrong: close programs, or take a lower quality",
+                "of real time",
+            ),
         };
         Texts { name, text, unit }
     }

@@ -168,7 +168,7 @@ impl SolverStage {
     /// Copies step, positions and velocities into a frame; does not allocate if the frame is large
     /// enough.
     pub fn publish(&self, frame: &mut SoftFrame) {
-        frame.step = self.steps;
+        (frame.step, frame.time_ms) = (self.steps, self.time_ms());
         frame.positions.clear();
         frame.positions.extend_from_slice(self.solver.positions());
         frame.velocities.clear();

@@ -27,7 +27,7 @@ mod requests;
 
 use crate::force_scale::ForceScale;
 use crate::program::Phase;
-use crate::stages::alarms::{Feed, WarningInputs};
+use crate::stages::alarms::{Feed, Pace, WarningInputs};
 use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm};
 use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
 use crate::stages::flap::{Flap, FlapPlace};
@@ -183,6 +183,7 @@ pub struct HapticStage {
     /// Number of strokes that came through, without those undone.
     holes: u32,
     feed: Feed,
+    pace: Pace,
     flap: Option<Flap>,
     /// Whether the flap's button was pressed in the last tick.
     asked_flap: bool,
@@ -228,6 +229,7 @@ impl HapticStage {
             undo: Undo::default(),
             holes: 0,
             feed: Feed::default(),
+            pace: Pace::UNKNOWN,
             flap: None,
             asked_flap: false,
             fault: AfterFault::default(),
@@ -463,6 +465,7 @@ impl HapticStage {
             desired_n: desired.sum().force.length(),
             stalled: record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some(),
             age_ms: (record.time_ms - patch.time_ms) as f32,
+            tissue_pace: self.pace.follow(record.time_ms, patch.tissue_ms),
             warm,
         }
     }

@@ -12,6 +12,7 @@ use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 /// What a tick without tissue is given.
 const NO_PATCH: SurfacePatch = SurfacePatch {
     time_ms: 0.0,
+    tissue_ms: 0.0,
     normal: trepan_geometry::Vec3::ZERO,
     tip_mm: trepan_geometry::Vec3::ZERO,
     force_n: 0.0,
