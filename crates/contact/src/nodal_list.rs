@@ -65,7 +65,7 @@ impl NodalContacts {
         self.overflow = 0;
     }
 
-    /// Moves each spring with its tool by a time, ms: the tool goes on between two collision results.
+    /// Moves each spring with its tool by a time, ms: tools go on between two collision results.
     pub fn follow_tool(&mut self, dt_ms: f32) {
         self.springs.iter_mut().for_each(|spring| spring.offset_mm -= dt_ms * spring.tool_normal_velocity);
     }

@@ -21,7 +21,7 @@ pub struct SurfacePatch {
     pub time_ms: f64,
     /// Simulated time of the tissue in this result, ms; 0 where nobody simulates it.
     pub tissue_ms: f64,
-    /// Direction of the tissue's force on the tool, a unit vector; zero when the tool did not touch.
+    /// Direction of the tissue's force on the tool, a unit vector; zero when it did not touch.
     pub normal: Vec3,
     /// The tip (the tool's origin) that `force_n` belongs to, world mm.
     pub tip_mm: Vec3,
@@ -34,7 +34,7 @@ pub struct SurfacePatch {
 }
 
 impl SurfacePatch {
-    /// Depth of a tool whose tip has moved to `tip`, for a hand's spring of a stiffness in N/mm, mm;
+    /// Depth of a tool whose tip has moved to `tip`, mm, for a hand's spring of a stiffness, N/mm;
     /// 0 outside.
     pub fn depth_at(&self, tip: Vec3, stiffness: f32) -> f32 {
         if self.force_n <= 0.0 || stiffness <= 0.0 {

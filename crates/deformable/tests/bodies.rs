@@ -21,9 +21,9 @@ fn with(mesh: &TetMesh, config: Config) -> TissueCollision {
     TissueCollision::new(mesh, &Tool::probe(2.0), &config).expect("a sound config")
 }
 
-/// Presses a shaft of radius 1.2 mm flat on a block of 32 mm that does not give way, its tip far
-/// out. For each mm of length the foundation has, with the axis h over the block and a the half
-/// width, `ε h (2 r asinh(a/h) - 2 a)`.
+/// Presses a shaft of radius 1.2 mm flat on a block of 32 mm that does not give way. For each mm of
+/// length the foundation has, with the axis h over the block and a the half width,
+/// `ε h (2 r asinh(a/h) - 2 a)`.
 #[test]
 fn a_shaft_pressed_flat_into_the_top_has_the_force_of_its_foundation() {
     let mesh = block([16, 16, 12], 2.0);
@@ -51,8 +51,8 @@ fn a_shaft_pressed_flat_into_the_top_has_the_force_of_its_foundation() {
     assert!(out.patch.force_n == 0.0 && out.surface_springs.is_empty());
 }
 
-/// 0.6 mm deep on a block that does not give way: each place drags by `ε s` until `μ p`, is carried
-/// by moving tissue, and what the tool feels the nodes take.
+/// Pressed 0.6 mm into a block that does not give way, each place drags by `ε s` until `μ p`.
+/// Moving tissue carries it along, and what the tool feels the nodes take.
 #[test]
 fn friction_sticks_slips_and_is_equal_and_opposite() {
     let mesh = block([16, 16, 6], 1.0);
