@@ -16,6 +16,7 @@
 //! sizes of the mesh are charted, not judged.
 
 use super::Scope;
+use super::outside::{Shape, Size};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use anyhow::{Context, Result};
@@ -26,7 +27,7 @@ use trepan_mesh::{TetMesh, lattice};
 use trepan_simulator::Ingredients;
 use trepan_simulator::measure::tissue::MASS_ADDED;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
-use trepan_tled::{Config, Tled};
+use trepan_tled::{Config, Damping, Tled};
 use trepan_volume::VoxelVolume;
 
 /// Radius and depth of the block, mm, and edge of its voxels, mm.
@@ -155,11 +156,25 @@ struct Found {
     skipped_ms: f64,
 }
 
+/// Damping of the built-in brain as a session damps it, 1/ms: critical for its lowest mode.
+/// Critical damping of the block's own would hold back a moving tool.
+fn damping_per_ms() -> Result<f32> {
+    let size = Size { count: 3_000, halvings: 0, of_truth: false };
+    let brain = Shape::brain()?.pressed(size, false)?.body;
+    let body = Body::uniform(brain.mesh, brain.fixed, Material::WHOLE_BRAIN);
+    Ok(Tled::new(&body, &Config::default())?.damping_per_ms())
+}
+
 fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, f64)> {
     let fixed = boxes::nodes_where(mesh, |p| p.z < 0.5 * VOXEL_MM - BLOCK_MM);
     let body = Body::uniform(mesh.clone(), fixed, Material::WHOLE_BRAIN);
-    let config =
-        Config { mass_scaling: MASS_ADDED, dynamic_mass_scaling: 16.0, averaged_pressure: true, ..Config::default() };
+    let config = Config {
+        mass_scaling: MASS_ADDED,
+        dynamic_mass_scaling: 16.0,
+        averaged_pressure: true,
+        damping: Damping::Rate(damping_per_ms()?),
+        ..Config::default()
+    };
     let mut solver = Tled::new(&body, &config)?;
     let touch = trepan_deformable::Config {
         friction: scene.friction,
