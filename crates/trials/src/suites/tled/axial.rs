@@ -10,10 +10,10 @@
 //! oblique way without friction is where an upright one would be at the same place.
 //!
 //! # Practice
-//! TLED steps as in a session: law, element, mass scaling and contact of `auto`, collision once in
-//! a millisecond. Beyond two radii a press without friction has no proven truth; there only
-//! direction, rest and inverted elements are judged. Other stiffnesses of the contact and other
-//! sizes of the mesh are charted, not judged.
+//! TLED steps as in a session: law, element, mass scaling and contact of `auto`, without
+//! relaxation, collision once in a millisecond. Beyond two radii a press without friction has no
+//! proven truth; there only direction, rest and inverted elements are judged. Other stiffnesses of
+//! the contact and other sizes of the mesh are charted, not judged.
 
 use super::Scope;
 use super::outside::{Shape, Size};
