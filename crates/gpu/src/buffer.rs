@@ -78,7 +78,9 @@ impl<T: bytemuck::Pod> Buffer<T> {
         let bytes = self.len * size_of::<T>();
         gpu.read_back(&staging, self.raw.size(), |data| bytemuck::pod_collect_to_vec(&data[..bytes]))
     }
+}
 
+impl<T> Buffer<T> {
     /// The wgpu buffer.
     pub fn raw(&self) -> &wgpu::Buffer {
         &self.raw

@@ -3,10 +3,13 @@
 use crate::GpuError;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Longest wait for the device before it counts as lost.
 pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Time that a reader stays awake for a card before it sleeps.
+const AWAKE: Duration = Duration::from_micros(500);
 
 /// Which kind of adapter to prefer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,6 +96,11 @@ impl Gpu {
     /// Display name of the adapter and its graphics API.
     pub fn name(&self) -> String {
         format!("{} ({})", self.inner.info.name, self.inner.info.backend)
+    }
+
+    /// Name and version of the driver.
+    pub fn driver(&self) -> String {
+        format!("{} {}", self.inner.info.driver, self.inner.info.driver_info)
     }
 
     /// Whether the adapter is a software driver.
@@ -183,9 +191,19 @@ impl Gpu {
             // The receiver is dropped only if this call has timed out.
             tell.send(mapped).ok();
         });
-        self.wait()?;
+        // The system wakes a sleeper later than a short piece of work is done.
+        let begun = Instant::now();
+        let mut answer = told.try_recv();
+        while answer.is_err() && !self.is_software() && begun.elapsed() < AWAKE {
+            self.inner.device.poll(wgpu::PollType::Poll).ok();
+            answer = told.try_recv();
+        }
+        if answer.is_err() {
+            self.wait()?;
+            answer = told.try_recv();
+        }
         let lost = |e: String| GpuError::Lost(e);
-        told.try_recv().map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
+        answer.map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
         let view = slice.get_mapped_range().map_err(|e| lost(e.to_string()))?;
         let taken = take(&view);
         drop(view);

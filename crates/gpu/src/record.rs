@@ -7,7 +7,7 @@ use crate::{Bindings, Gpu, Kernel, Pipeline, Texture, Timer};
 #[derive(Debug)]
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
-    encoder: wgpu::CommandEncoder,
+    pub(crate) encoder: wgpu::CommandEncoder,
     timer: Option<&'a mut Timer>,
 }
 
