@@ -57,6 +57,6 @@ pub const TLED_FORCES: [&str; 5] = [
 /// Volume change of every tetrahedron, and its mean around the nodes.
 pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("node_groups.wgsl")];
 /// The contact springs on the tissue surface.
-pub const TLED_PRESS: &str = tled!("fluid.wgsl", "press.wgsl");
+pub const TLED_PRESS: &str = tled!("fluid.wgsl", "gather.wgsl", "press.wgsl");
 /// Sums the forces at nodes and integrates their motion.
-pub const TLED_UPDATE: &str = tled!("fluid.wgsl", "update.wgsl");
+pub const TLED_UPDATE: &str = tled!("fluid.wgsl", "gather.wgsl", "update.wgsl");

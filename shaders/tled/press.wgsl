@@ -1,8 +1,8 @@
 // Forces of all springs on the nodes they touch, each implicit, one after the other, with the
 // velocities v that nodes would have without the springs to come: d = d_rest + Σ w u·n    p =
 // max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m)) What slides across the
-// normal of a pressing spring is damped, node by node. Planes, springs of one node each and no two
-// of the same, follow side by side; they damp sliding by how deep their node is.
+// normal of a pressing spring is damped, node by node. Springs of one node that no other touches
+// follow side by side, then planes, no two of the same node; they damp sliding by how deep it is.
 // Depth from which sliding along a plane is damped as strongly as the normal velocity.
 const SLIDING_FULL_MM = 0.2;
 
@@ -35,7 +35,10 @@ struct Spring {
 @group(0) @binding(8) var<storage, read_write> pressure: array<f32>;
 @group(0) @binding(9) var<storage, read> anchors: array<Anchor>;
 
-var<workgroup> sums: array<vec3f, 64>;
+const LANES = 256u;
+// Nodes of a spring at most.
+const NODES = 64u;
+var<workgroup> sums: array<vec3f, LANES>;
 
 // Force of a spring that is so deep, mm, on nodes that come at this speed, mm/ms.
 fn pressed(spring: Spring, depth: f32, coming: f32, compliance: f32, touches: bool) -> f32 {
@@ -50,8 +53,7 @@ fn pressed(spring: Spring, depth: f32, coming: f32, compliance: f32, touches: bo
 fn free_velocity(at: vec4u) -> vec3f {
     let inverse_mass = bitcast<f32>(at.z);
     if inverse_mass == 0.0 { return v[at.x].xyz; }
-    var force = pushed[at.x].xyz;
-    for (var slot = starts[at.x]; slot < starts[at.x + 1u]; slot++) { force += forces[slot].xyz; }
+    let force = pushed[at.x].xyz + gathered(at.x).force;
     let moved = u[at.x].xyz;
     let pull = weight_at(at.x, moved) * bitcast<f32>(at.w) + force * inverse_mass;
     return anchored(at.x, moved, v[at.x].xyz * now.keep + pull * now.gain, inverse_mass * now.gain);
@@ -65,22 +67,34 @@ fn moved_by_force(at: vec4u) -> f32 {
     return inverse_mass / (1.0 + held * inverse_mass * now.gain * now.dt);
 }
 
-@compute @workgroup_size(64) fn main(@builtin(local_invocation_index) lane: u32) {
-    for (var s = 0u; s < now.springs; s++) {
-        let spring = springs[s];
-        if lane < spring.count { pushed[touched[spring.first + lane].x] = vec4f(0.0); }
+// Adds a pressing spring's force to what pushes one of its nodes.
+fn push(spring: Spring, force: f32, at: vec4u, velocity: vec3f) {
+    let weight = bitcast<f32>(at.y);
+    let slip = velocity - spring.lateral_velocity;
+    let sliding = slip - spring.normal * dot(slip, spring.normal);
+    let damping = weight * spring.lateral_damping;
+    let brake = damping / (1.0 + now.gain * bitcast<f32>(at.z) * damping);
+    pushed[at.x] += vec4f(-spring.normal * (force * weight) - sliding * brake, 0.0);
+}
+
+// Sums over the first lanes by a tree of fixed shape: the same in every run.
+fn add_up(lane: u32, lanes: u32) {
+    workgroupBarrier();
+    for (var reach = lanes / 2u; reach > 0u; reach >>= 1u) {
+        if lane < reach { sums[lane] += sums[lane + reach]; }
+        workgroupBarrier();
     }
-    for (var s = now.springs + lane; s < now.springs + now.planes; s += 64u) {
-        pushed[touched[springs[s].first].x] = vec4f(0.0);
-    }
+}
+
+@compute @workgroup_size(LANES) fn main(@builtin(local_invocation_index) lane: u32) {
+    for (var n = lane; n < now.touched; n += LANES) { pushed[touched[n].x] = vec4f(0.0); }
     storageBarrier();
     var total = 0.0;
     for (var s = 0u; s < now.springs; s++) {
         let spring = springs[s];
-        let at = touched[spring.first + lane];
+        let at = touched[spring.first + min(lane, NODES - 1u)];
         let weight = bitcast<f32>(at.y);
         let mine = lane < spring.count;
-        let inverse_mass = bitcast<f32>(at.z);
         var velocity = vec3f(0.0);
         sums[lane] = vec3f(0.0);
         if mine {
@@ -88,27 +102,30 @@ fn moved_by_force(at: vec4u) -> f32 {
             let along = vec2f(dot(u[at.x].xyz, spring.normal), dot(velocity, spring.normal));
             sums[lane] = weight * vec3f(along, weight * moved_by_force(at));
         }
-        workgroupBarrier();
-        // A tree of fixed shape: the same sum in every run.
-        for (var reach = 32u; reach > 0u; reach >>= 1u) {
-            if lane < reach { sums[lane] += sums[lane + reach]; }
-            workgroupBarrier();
-        }
+        add_up(lane, NODES);
         let depth = spring.rest_depth + sums[0].x;
         let force = pressed(spring, depth, sums[0].y, sums[0].z, depth > 0.0);
         total += force;
-        if mine && depth > 0.0 {
-            let slip = velocity - spring.lateral_velocity;
-            let sliding = slip - spring.normal * dot(slip, spring.normal);
-            let damping = weight * spring.lateral_damping;
-            let push = -spring.normal * (force * weight) - sliding * (damping / (1.0 + now.gain * inverse_mass * damping));
-            pushed[at.x] += vec4f(push, 0.0);
-        }
+        if mine && depth > 0.0 { push(spring, force, at, velocity); }
         storageBarrier();
         workgroupBarrier();
     }
-    var of_planes = 0.0;
-    for (var s = now.springs + lane; s < now.springs + now.planes; s += 64u) {
+    var beside = 0.0;
+    let singles_end = now.springs + now.singles;
+    for (var s = now.springs + lane; s < singles_end; s += LANES) {
+        let spring = springs[s];
+        let at = touched[spring.first];
+        let weight = bitcast<f32>(at.y);
+        let velocity = free_velocity(at);
+        let depth = spring.rest_depth + weight * dot(u[at.x].xyz, spring.normal);
+        let coming = weight * dot(velocity, spring.normal);
+        let force = pressed(spring, depth, coming, weight * weight * moved_by_force(at), depth > 0.0);
+        beside += force;
+        if depth > 0.0 { push(spring, force, at, velocity); }
+    }
+    storageBarrier();
+    workgroupBarrier();
+    for (var s = singles_end + lane; s < singles_end + now.planes; s += LANES) {
         let plane = springs[s];
         let at = touched[plane.first];
         let depth = plane.rest_depth + dot(u[at.x].xyz, plane.normal);
@@ -119,16 +136,12 @@ fn moved_by_force(at: vec4u) -> f32 {
         var reached = plane;
         if depth <= 0.0 { reached.damping *= ahead / (now.dt * coming); }
         let force = pressed(reached, depth, coming, moved_by_force(at), depth > 0.0 || ahead > 0.0);
-        of_planes += force;
+        beside += force;
         let braking = plane.damping * clamp(depth / SLIDING_FULL_MM, 0.0, 1.0);
         let brake = braking / (1.0 + now.gain * bitcast<f32>(at.z) * braking);
         pushed[at.x] -= vec4f(plane.normal * force + (velocity - plane.normal * coming) * brake, 0.0);
     }
-    sums[lane] = vec3f(of_planes, 0.0, 0.0);
-    workgroupBarrier();
-    for (var reach = 32u; reach > 0u; reach >>= 1u) {
-        if lane < reach { sums[lane] += sums[lane + reach]; }
-        workgroupBarrier();
-    }
+    sums[lane] = vec3f(beside, 0.0, 0.0);
+    add_up(lane, LANES);
     if lane == 0u { pressure[0] = total + sums[0].x; }
 }

@@ -2,7 +2,7 @@
 // differences. v⁺ = keep v + gain (w g + f/m)    u⁺ = u + dt v⁺
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
 @group(0) @binding(2) var<storage, read> forces: array<vec4f>;
-// 1/m, 0 where the node is fixed; the share of m that has weight; whether a spring pushes it.
+// 1/m, 0 where the node is fixed; the share of m that has weight.
 @group(0) @binding(3) var<storage, read> nodes: array<vec4f>;
 @group(0) @binding(4) var<storage, read> pushed: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> u: array<vec4f>;
@@ -20,21 +20,13 @@ fn finite(x: vec3f) -> bool {
 @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
     let n = id.x;
     if n >= now.nodes { return; }
-    var force = vec3f(0.0);
-    var growth = 0.0;
-    var inverted = 0u;
-    for (var slot = starts[n]; slot < starts[n + 1u]; slot++) {
-        let f = forces[slot];
-        force += f.xyz;
-        growth = max(growth, abs(f.w));
-        inverted += select(0u, 1u, f.w < 0.0);
-    }
+    let sum = gathered(n);
+    let force = sum.force + pushed[n].xyz;
     var seen = noticed[n];
-    seen.x = max(seen.x, inverted);
-    seen.w = max(seen.w, bitcast<u32>(growth));
+    seen.x = max(seen.x, sum.inverted);
+    seen.w = max(seen.w, bitcast<u32>(sum.growth));
     let node = nodes[n];
     if node.x > 0.0 {
-        if node.z != 0.0 { force += pushed[n].xyz; }
         let before = u[n].xyz;
         let pull = weight_at(n, before) * node.y + force * node.x;
         var velocity = anchored(n, before, v[n].xyz * now.keep + pull * now.gain, node.x * now.gain);

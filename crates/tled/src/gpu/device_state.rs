@@ -24,7 +24,8 @@ pub(crate) struct Step {
     pub fade_gain: [f32; 4],
     pub planes: u32,
     pub opening_mpa: f32,
-    pub unused: [u32; 2],
+    pub singles: u32,
+    pub touched: u32,
     pub up: [f32; 3],
     pub level_mm: f32,
     pub weight: [f32; 3],
@@ -71,7 +72,7 @@ pub(crate) struct DeviceState {
     pub u: Buffer<[f32; 4]>,
     /// Velocities by place, mm/ms.
     pub v: Buffer<[f32; 4]>,
-    /// By place: 1/m, 1/g; the share of m that has weight; 1 where a spring pushes.
+    /// By place: 1/m, 1/g; the share of m that has weight.
     pub nodes: Buffer<[f32; 4]>,
     /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of
     /// the largest growth of ω².
@@ -104,12 +105,5 @@ impl DeviceState {
     /// 1/m of the node at a place, 1/g, and the share of m that has weight.
     pub fn mass_of(&self, place: u32) -> [f32; 2] {
         [self.inverse_mass[place as usize], self.weight[place as usize]]
-    }
-
-    /// Says whether a spring pushes a node.
-    pub fn mark(&mut self, gpu: &Gpu, place: u32, is_pushed: bool) {
-        let place = place as usize;
-        let pushed = f32::from(u8::from(is_pushed));
-        self.nodes.write(gpu, place, &[[self.inverse_mass[place], self.weight[place], pushed, 0.0]]);
     }
 }

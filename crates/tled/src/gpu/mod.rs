@@ -61,15 +61,21 @@ use pass::Pass;
 use press::Press;
 pub use spare::WithSpare;
 use topology::Topology;
-use trepan_contact::PlaneContact;
+use trepan_contact::{NodalContact, PlaneContact};
 use trepan_geometry::Vec3;
-use trepan_gpu::{Gpu, GpuError};
+use trepan_gpu::{Gpu, GpuError, PassTime, Readback, Recorder, Timer};
 use trepan_soft::{Body, BodyError, Loads, NodeState, SoftSolver, StepReport};
 
 /// Threads in a workgroup, as in the shaders.
 pub(crate) const LANES: u32 = 64;
-/// Most steps in one submission; more are cut, so that no driver takes them for a hang.
-const STEPS_AT_ONCE: u32 = 256;
+/// Most steps in one submission: the device runs some while the next are recorded, and no driver
+/// takes them for a hang.
+const STEPS_AT_ONCE: u32 = 16;
+/// Most steps that are timed at once.
+const TIMED_AT_ONCE: u32 = 256;
+/// Time that a call of [`SoftSolver::step`] should take, ms of tissue: waiting for the device costs
+/// as much as several substeps.
+const CALL_MS: f32 = 0.5;
 
 /// Why a body does not run on the device.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -103,11 +109,14 @@ pub struct GpuTled {
     forces: Forces,
     press: Press,
     update: Pass,
+    readback: Readback,
     elements: u32,
     node_groups: u32,
     /// Largest growth of an element's ω² between the last two reads, 1/ms².
     growth: f32,
     submitted: u32,
+    /// Whether the newest submission copies the state back.
+    copied: bool,
     fault: Option<GpuError>,
 }
 
@@ -123,7 +132,9 @@ impl GpuTled {
         let forces = Forces::new(gpu, (body, layout, &scaling), config, &state, &topology)?;
         let volumes = || volumes::passes(gpu, (body, layout, &node_groups), &state, &topology, &forces);
         let press = Press::new(gpu, &state, &topology, &forces)?;
+        let read = [state.u.raw(), state.v.raw(), state.noticed.raw(), press.pressure.raw()];
         Ok(Self {
+            readback: Readback::new(gpu, "tissue", &read)?,
             volumes: averages.then(volumes).transpose()?,
             update: update::pass(gpu, &state, &topology, &forces, &press)?,
             gpu: gpu.clone(),
@@ -131,6 +142,7 @@ impl GpuTled {
             node_groups: node_groups.place_of.len() as u32,
             growth: 0.0,
             submitted: 0,
+            copied: false,
             fault: None,
             base,
             state,
@@ -143,30 +155,42 @@ impl GpuTled {
     /// length, ms. Does not wait.
     pub fn steps(&mut self, loads: &Loads, count: u32) -> f32 {
         let dt_ms = self.base.longest_ms(self.growth);
-        self.submit(loads, dt_ms, count);
+        self.submit(loads, dt_ms, count, false);
         dt_ms
     }
 
     /// Waits for the device and copies positions and velocities back. Counts are of all steps since
     /// the last time, inverted elements those of every node's worst step.
     pub fn read(&mut self) -> Result<StepReport, GpuError> {
-        let (u, v) = (self.state.u.read(&self.gpu)?, self.state.v.read(&self.gpu)?);
-        let noticed = self.state.noticed.read(&self.gpu)?;
-        let contact_n = self.press.pressure.read(&self.gpu)?[0];
+        if !std::mem::take(&mut self.copied) {
+            let mut recorder = self.gpu.record("read");
+            self.copy(&mut recorder);
+            recorder.submit();
+        }
         let Base { layout, rest, state, .. } = &mut self.base;
-        for (place, node) in layout.node_at.iter().map(|&n| n as usize).enumerate() {
-            state.positions[node] = rest[node] + Vec3::from_slice(&u[place]);
-            state.velocities[node] = Vec3::from_slice(&v[place]);
-        }
+        let (noticed, contact_n) = self.readback.read(&self.gpu, |part| {
+            let [u, v] = [0, 1].map(|n| bytemuck::cast_slice::<u8, [f32; 4]>(part[n]));
+            for (place, node) in layout.node_at.iter().map(|&n| n as usize).enumerate() {
+                state.positions[node] = rest[node] + Vec3::from_slice(&u[place]);
+                state.velocities[node] = Vec3::from_slice(&v[place]);
+            }
+            let mut noticed = [0u32; 4];
+            for [inverted, limited, non_finite, growth] in bytemuck::cast_slice::<u8, [u32; 4]>(part[2]) {
+                noticed[0] += inverted;
+                noticed[1] += limited;
+                noticed[2] += non_finite;
+                // Of numbers that are not negative the bits are in the numbers' order.
+                noticed[3] = noticed[3].max(*growth);
+            }
+            (noticed, bytemuck::cast_slice::<u8, f32>(part[3])[0])
+        })?;
         if self.submitted > 0 {
-            self.growth = noticed.iter().map(|n| f32::from_bits(n[3])).fold(0.0, f32::max);
-            self.state.noticed.write(&self.gpu, 0, &vec![[0; 4]; noticed.len()]);
+            self.growth = f32::from_bits(noticed[3]);
         }
-        let sum = |k: usize| noticed.iter().map(|n| n[k]).sum();
         Ok(StepReport {
-            inverted: sum(0),
-            limited: sum(1),
-            non_finite: sum(2),
+            inverted: noticed[0],
+            limited: noticed[1],
+            non_finite: noticed[2],
             substeps: std::mem::take(&mut self.submitted),
             contact_n,
             converged: true,
@@ -187,20 +211,22 @@ impl GpuTled {
 
     /// Submits `count` steps of one length. Where the last step had another length, the first of
     /// these lets past stress fade for as long as that, and changes velocities from its middle on.
-    fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
-        let mut step = self.numbers(loads, dt_ms);
-        let presses = step.springs + step.planes > 0;
-        if !presses {
-            self.press.pressure.write(&self.gpu, 0, &[0.0]);
-        }
+    /// With `reads` the state is copied back by the same submission.
+    fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32, reads: bool) {
+        let (mut step, mut clears) = self.numbers(loads, dt_ms);
         let first = u32::from(self.base.elapsed_ms != dt_ms).min(count);
-        for (elapsed_ms, count) in [(self.base.elapsed_ms, first), (dt_ms, count - first)] {
+        for (elapsed_ms, now, is_last) in
+            [(self.base.elapsed_ms, first, count == first), (dt_ms, count - first, count > first)]
+        {
+            if now == 0 {
+                continue;
+            }
             let fade = self.base.config.relaxation.fade(elapsed_ms);
             let of_terms = |of: fn(&Fade) -> f32| std::array::from_fn(|term| fade.get(term).map_or(0.0, of));
             [step.keep, step.gain] = keep_and_gain(self.base.damping_per_ms, kick_ms(elapsed_ms, dt_ms));
             (step.fade_keep, step.fade_gain) = (of_terms(|fade| fade.keep), of_terms(|fade| fade.gain));
             self.state.step.write(&self.gpu, 0, &[step]);
-            self.run(count, presses);
+            self.run(now, std::mem::take(&mut clears), reads && is_last);
         }
         if count > 0 {
             self.base.elapsed_ms = dt_ms;
@@ -208,31 +234,78 @@ impl GpuTled {
         self.submitted += count;
     }
 
-    /// Submits steps by the numbers that the device has.
-    fn run(&self, count: u32, presses: bool) {
+    /// Submits steps by the numbers that the device has; `clears` what pushed the nodes before,
+    /// `reads` the state afterwards.
+    fn run(&mut self, count: u32, mut clears: bool, reads: bool) {
         let mut left = count;
         while left > 0 {
             let now = left.min(STEPS_AT_ONCE);
             let mut recorder = self.gpu.record("tled");
-            recorder.compute("tled", |to| {
-                for _ in 0..now {
-                    self.volumes.iter().flatten().chain(&self.forces.laws).for_each(|pass| pass.dispatch(to));
-                    if presses {
-                        self.press.pass.dispatch(to);
-                    }
-                    self.update.dispatch(to);
-                }
-            });
-            recorder.submit();
+            if std::mem::take(&mut clears) {
+                recorder.clear(&self.press.pushed);
+                recorder.clear(&self.press.pressure);
+            }
+            self.record(&mut recorder, now, self.press.presses());
             left -= now;
+            self.copied = reads && left == 0;
+            if self.copied {
+                self.copy(&mut recorder);
+            }
+            recorder.submit();
         }
     }
 
-    /// The uniform of a step; hands the springs over.
-    fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
-        let (springs, planes) = self.hand_over(loads);
-        let Base { config, layout, max_displacement_mm, .. } = &self.base;
-        Step {
+    /// Records the copy of the state to the host.
+    fn copy(&self, recorder: &mut Recorder) {
+        recorder.copy(&self.readback);
+        recorder.clear(&self.state.noticed);
+    }
+
+    /// Records some steps as one pass.
+    fn record(&self, recorder: &mut Recorder, steps: u32, presses: bool) {
+        recorder.compute("tled", |to| {
+            for _ in 0..steps {
+                self.passes(presses).for_each(|(_, pass)| pass.dispatch(to));
+            }
+        });
+    }
+
+    /// The passes of a step in their order.
+    fn passes(&self, presses: bool) -> impl Iterator<Item = (&'static str, &Pass)> {
+        let volumes = ["volumes", "node_groups"].into_iter().zip(self.volumes.iter().flatten());
+        let forces = self.forces.laws.iter().map(|pass| ("forces", pass));
+        let press = presses.then_some(("press", &self.press.pass));
+        volumes.chain(forces).chain(press).chain([("update", &self.update)])
+    }
+
+    /// Runs `count` further steps, at most 256, of the last length and loads and returns the
+    /// device's own time: of all together, µs, and of each pass of one more step. Empty where the
+    /// device has no clock.
+    pub fn timed(&mut self, count: u32) -> Result<(f64, Vec<PassTime>), GpuError> {
+        let presses = self.press.presses();
+        let Some(mut timer) = Timer::new(&self.gpu, 16)? else { return Ok((f64::NAN, Vec::new())) };
+        let mut recorder = self.gpu.record("timed").timed(Some(&mut timer));
+        self.record(&mut recorder, count.min(TIMED_AT_ONCE), presses);
+        self.passes(presses).for_each(|(name, pass)| recorder.compute(name, |to| pass.dispatch(to)));
+        recorder.submit();
+        self.submitted += count.min(TIMED_AT_ONCE) + 1;
+        let mut times = timer.read(&self.gpu)?;
+        let all = times.remove(0);
+        Ok((all.us, times))
+    }
+
+    /// The uniform of a step, and whether what pushed before must be cleared; hands the springs over.
+    fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> (Step, bool) {
+        let Base { config, layout, rest, max_displacement_mm, .. } = &self.base;
+        let (press, state, place_of) = (&mut self.press, &self.state, &layout.place_of);
+        let at_rest = |n: u32| rest.get(n as usize).copied().unwrap_or_default();
+        let deep = |spring: &NodalContact| spring.offset_mm + spring.mean(at_rest).dot(spring.normal);
+        let [springs, singles] = press.list_springs(&loads.contacts, deep, place_of, state);
+        let added =
+            |plane: &&PlaneContact| press.list.add_plane(plane, plane.depth_mm(at_rest(plane.node)), place_of, state);
+        let planes = loads.contacts.planes().iter().filter(added).count() as u32;
+        let (touched, clears) = press.hand_over(&self.gpu);
+        let step = Step {
             gravity: (loads.gravity - config.balanced_gravity).to_array(),
             opening_mpa: loads.fluid.opening_mpa,
             up: loads.fluid.up.to_array(),
@@ -242,28 +315,15 @@ impl GpuTled {
             max_speed: config.max_speed,
             max_displacement: *max_displacement_mm,
             springs,
+            singles,
             planes,
+            touched,
             elements: self.elements,
             nodes: layout.node_at.len() as u32,
             node_groups: self.node_groups,
             ..Step::default()
-        }
-    }
-
-    /// Gives the device every spring and plane; gives how many springs and planes there are.
-    fn hand_over(&mut self, loads: &Loads) -> (u32, u32) {
-        let at_rest = |n: u32| self.base.rest.get(n as usize).copied().unwrap_or_default();
-        let (list, place_of) = (&mut self.press.list, &self.base.layout.place_of);
-        list.clear();
-        for spring in loads.contacts.iter() {
-            let rest_depth = spring.offset_mm + spring.mean(at_rest).dot(spring.normal);
-            list.add(spring, rest_depth, place_of, &self.state);
-        }
-        let added =
-            |plane: &&PlaneContact| list.add_plane(plane, plane.depth_mm(at_rest(plane.node)), place_of, &self.state);
-        let planes = loads.contacts.planes().iter().filter(added).count();
-        self.press.touch(&self.gpu, &mut self.state);
-        (loads.contacts.len() as u32, planes as u32)
+        };
+        (step, clears)
     }
 }
 
@@ -274,7 +334,7 @@ impl SoftSolver for GpuTled {
         let count = if most == 0 { 1.0 } else { needed.min(most as f32) };
         let each_ms = if most == 0 { dt_ms } else { dt_ms / needed };
         let before = self.submitted;
-        self.submit(loads, each_ms, count as u32);
+        self.submit(loads, each_ms, count as u32, true);
         match self.read() {
             Ok(mut report) => {
                 report.substeps -= before;
@@ -298,7 +358,9 @@ impl SoftSolver for GpuTled {
     }
 
     fn next_dt_ms(&self) -> f32 {
-        self.base.next_dt_ms(self.growth)
+        let substep_ms = self.base.next_dt_ms(self.growth);
+        // One substep is left for an element that grows stiffer on the way.
+        substep_ms * (CALL_MS / substep_ms).floor().clamp(1.0, self.base.config.substeps.max(2) as f32 - 1.0)
     }
 }
 

@@ -15,20 +15,16 @@ pub(crate) struct Press {
     pub pass: Pass,
     springs: Buffer<Spring>,
     touched: Buffer<[u32; 4]>,
-    /// Forces of the springs by place, N; of meaning where a node is marked.
+    /// Forces of the springs by place, N; zero where nothing presses.
     pub pushed: Buffer<[f32; 4]>,
     /// Sum over the springs in the newest step, N.
     pub pressure: Buffer<f32>,
     /// The springs of the next submission.
     pub list: List,
-    marks: Marks,
-}
-
-/// Which places are marked as pushed on the device, and in which hand-over each was last pushed.
-struct Marks {
-    marked: Vec<u32>,
-    pushed_in: Vec<u32>,
-    hand_over: u32,
+    /// By place, springs on it while a list is made; zeroes between lists.
+    uses: Vec<u32>,
+    /// Whether the last list held anything.
+    presses: bool,
 }
 
 /// A spring as `press.wgsl` declares it.
@@ -128,28 +124,52 @@ impl Press {
         let pass = Pass::new(gpu, "press", TLED_PRESS, &bound, 1)?;
         let springs_of = Vec::with_capacity(MAX_SPRINGS + MAX_PLANES);
         let list = List { springs: springs_of, touched: Vec::with_capacity(most) };
-        let marks = Marks { marked: Vec::with_capacity(most), pushed_in: vec![0; state.u.len()], hand_over: 0 };
-        Ok(Self { pass, springs, touched, pushed, pressure, list, marks })
+        Ok(Self { pass, springs, touched, pushed, pressure, list, uses: vec![0; state.u.len()], presses: false })
     }
 
-    /// Hands the list over, and marks of the nodes where they changed.
-    pub fn touch(&mut self, gpu: &Gpu, state: &mut DeviceState) {
+    /// Takes the springs of the next steps: those that share nodes, then those of one node that no
+    /// other spring touches. `deep` tells how deep one is where nothing moved. Returns how many of
+    /// each there are.
+    pub fn list_springs(
+        &mut self,
+        springs: &[NodalContact],
+        deep: impl Fn(&NodalContact) -> f32,
+        place_of: &[u32],
+        state: &DeviceState,
+    ) -> [u32; 2] {
+        let Self { list, uses, .. } = self;
+        list.clear();
+        let place = |(node, _): (u32, f32)| place_of.get(node as usize).map(|&place| place as usize);
+        springs.iter().flat_map(NodalContact::nodes).filter_map(place).for_each(|at| uses[at] += 1);
+        let is_single = |spring: &NodalContact| {
+            let mut nodes = spring.nodes();
+            nodes.next().and_then(place).is_some_and(|at| uses[at] == 1) && nodes.next().is_none()
+        };
+        let mut counts = [0; 2];
+        for (n, count) in counts.iter_mut().enumerate() {
+            for spring in springs.iter().filter(|spring| usize::from(is_single(spring)) == n) {
+                list.add(spring, deep(spring), place_of, state);
+                *count += 1;
+            }
+        }
+        springs.iter().flat_map(NodalContact::nodes).filter_map(place).for_each(|at| uses[at] = 0);
+        counts
+    }
+
+    /// Whether anything was handed over that presses.
+    pub fn presses(&self) -> bool {
+        self.presses
+    }
+
+    /// Hands the list over; returns the number of its nodes, and whether what pushed before must be
+    /// cleared.
+    pub fn hand_over(&mut self, gpu: &Gpu) -> (u32, bool) {
         let List { springs, touched } = &self.list;
-        if !springs.is_empty() {
+        let before = std::mem::replace(&mut self.presses, !springs.is_empty());
+        if self.presses {
             self.springs.write(gpu, 0, springs);
             self.touched.write(gpu, 0, touched);
         }
-        let Marks { marked, pushed_in, hand_over } = &mut self.marks;
-        let before = *hand_over;
-        *hand_over = hand_over.wrapping_add(1).max(1);
-        for &[place, ..] in touched {
-            let last = std::mem::replace(&mut pushed_in[place as usize], *hand_over);
-            if last != *hand_over && (last != before || before == 0) {
-                state.mark(gpu, place, true);
-            }
-        }
-        marked.retain(|&place| pushed_in[place as usize] != *hand_over);
-        marked.drain(..).for_each(|place| state.mark(gpu, place, false));
-        marked.extend(touched.iter().map(|[place, ..]| *place));
+        (touched.len() as u32, before || self.presses)
     }
 }
