@@ -6,8 +6,7 @@
 @group(0) @binding(10) var mri: texture_3d<f32>;
 @group(0) @binding(11) var bone_coat: texture_3d<f32>;    // colours over bone, alpha multiplied in
 @group(0) @binding(12) var brain_coat: texture_3d<f32>;
-
-@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
+@group(0) @binding(13) var picture: texture_storage_2d<rgba8unorm, write>;
 
 // Fraction of the lamp's light that passes a body at distance `gap` from the beam, `way` mm away:
 // the lamp is a disc.
@@ -127,9 +126,9 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, l
     return lit(colour, normal, along, 1.0, 1.0, 0.7);
 }
 
-@fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
-    let along = ray_of(pixel.xy);
-    let at = vec2i(pixel.xy);
+fn seen(at: vec2u) -> vec3f {
+    let pixel = vec2f(at) + 0.5;
+    let along = ray_of(pixel);
     let skull = unpacked(textureLoad(skull_hit, at, 0));
     var brain = unpacked(textureLoad(brain_hit, at, 0));
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
@@ -153,5 +152,9 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, l
     } else {
         colour = shade_bone(point, along, skull);
     }
-    return vec4f(pow(clamp(colour, vec3f(0.0), vec3f(1.0)), vec3f(1.0 / 2.2)), 1.0);
+    return pow(clamp(colour, vec3f(0.0), vec3f(1.0)), vec3f(1.0 / 2.2));
+}
+
+@compute @workgroup_size(8, 8) fn main(@builtin(global_invocation_id) id: vec3u) {
+    if all(id.xy < textureDimensions(skull_hit)) { textureStore(picture, id.xy, vec4f(seen(id.xy), 1.0)); }
 }

@@ -1,4 +1,4 @@
-// Data shared by all render passes: camera, bone grid, tool, light. Layout of the Rust type
+// Data shared by all passes of a picture: camera, bone grid, tool, light. Layout of the Rust type
 // `Scene`.
 
 struct Scene {
@@ -28,7 +28,7 @@ struct Scene {
 const NOTHING: f32 = 1e30;
 
 // Hits are passed between passes as the bits of floats in integer textures, which every driver can
-// render to.
+// write.
 fn packed(v: vec4f) -> vec4u { return bitcast<vec4u>(v); }
 
 fn unpacked(v: vec4u) -> vec4f { return bitcast<vec4f>(v); }

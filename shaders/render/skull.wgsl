@@ -1,12 +1,12 @@
 // The bone's isosurface at every pixel. Output: octahedral normal (xy), ambient light fraction,
 // plus 1 if lit by the lamp (z), distance along the ray in mm (w).
 
-@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
-
 // A surface: its unit normal, outwards, and the height over it at which shadow rays start, voxels.
 struct Surface { normal: vec3f, lift: f32 }
 
 @group(0) @binding(7) var smooth_ct: texture_3d<f32>;   // the CT behind a Gaussian, on a coarser lattice
+@group(0) @binding(8) var<uniform> part: vec4u;        // pixels to cast: the upper left one, width, height
+@group(0) @binding(9) var hits: texture_storage_2d<rgba32uint, write>;
 
 const REACH_MM: f32 = 0.5;   // from the middle to the corners of the cube whose differences are the gradient
 
@@ -45,16 +45,21 @@ fn surface(g: vec3f, along: vec3f) -> Surface {
     return Surface(normalize(rise), 0.2 * node);
 }
 
-@fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4u {
-    let along = ray_of(pixel.xy);
+fn hit(along: vec3f) -> vec4f {
     let o = grid_of(scene.eye.xyz);
     let d = along / scene.origin.w;
     let t = meet(o, d, NOTHING);
-    if t >= NOTHING { return packed(vec4f(0.0, 0.0, 1.0, NOTHING)); }
+    if t >= NOTHING { return vec4f(0.0, 0.0, 1.0, NOTHING); }
     let g = o + d * t;
     var met = Surface(scene.bone_cut.xyz, lift());
     if !on_cut(scene.eye.xyz + t * along) { met = surface(g, along); }
     let normal = met.normal;
     let facing = dot(normal, scene.light.xyz) > 0.0 && !shadowed(g, normal, met.lift);
-    return packed(vec4f(fold(normal), 0.999 * openness(g, normal) + select(0.0, 1.0, facing), t));
+    return vec4f(fold(normal), 0.999 * openness(g, normal) + select(0.0, 1.0, facing), t);
+}
+
+@compute @workgroup_size(8, 8) fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= part.zw) { return; }
+    let at = part.xy + id.xy;
+    textureStore(hits, at, packed(hit(ray_of(vec2f(at) + 0.5))));
 }

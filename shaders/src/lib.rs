@@ -1,9 +1,9 @@
 //! Trepan's WGSL shaders as strings: one file per pass, named like the Rust file that runs it.
 //!
 //! # Practice
-//! Render passes start with the text of `scene.wgsl`, those of a soft-tissue step with `step.wgsl`,
-//! which declare their shared data at binding 0. naga checks every entry point when its pipeline is
-//! created; there is nothing to build and no path to find at run time.
+//! A picture's passes start with the text of `scene.wgsl`, those of a soft-tissue step with
+//! `step.wgsl`, which declare their shared data at binding 0. naga checks every entry point when
+//! its pipeline is created; there is nothing to build and no path to find at run time.
 
 /// Prepends the text of `scene.wgsl`.
 macro_rules! picture {

@@ -1,6 +1,6 @@
 //! Shader binding slots and the resources bound to them.
 
-use crate::{Buffer, Gpu, GpuError, Texture};
+use crate::{Buffer, Format, Gpu, GpuError, Texture};
 
 /// The resource type of one binding of group 0; its list index is the binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +19,8 @@ pub enum Slot {
     Texture3,
     /// `texture_3d<u32>`: only loaded.
     Integer3,
+    /// `texture_storage_2d<_, write>` of a format: only stored, by kernels.
+    Store2(Format),
     /// A linear `sampler`.
     Sampler,
 }
@@ -69,6 +71,11 @@ impl Slot {
             Self::Texture3 => texture(float, wgpu::TextureViewDimension::D3),
             Self::Integer2 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
             Self::Integer3 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D3),
+            Self::Store2(format) => wgpu::BindingType::StorageTexture {
+                access: wgpu::StorageTextureAccess::WriteOnly,
+                format: format.raw(),
+                view_dimension: wgpu::TextureViewDimension::D2,
+            },
             Self::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
         }
     }

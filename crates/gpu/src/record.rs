@@ -72,6 +72,11 @@ impl<'a> Recorder<'a> {
         self
     }
 
+    /// The device.
+    pub fn gpu(&self) -> &'a Gpu {
+        self.gpu
+    }
+
     /// A compute pass of several dispatches; each sees the writes of those before it.
     pub fn compute(&mut self, name: &'static str, steps: impl FnOnce(&mut Dispatches)) {
         let queries = self.timer.as_mut().and_then(|t| t.next(name));

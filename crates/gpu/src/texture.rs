@@ -35,6 +35,8 @@ pub struct TextureSpec<'a> {
     pub format: Format,
     /// Whether passes render to it.
     pub drawn_to: bool,
+    /// Whether kernels store to it.
+    pub stored_to: bool,
 }
 
 /// A texture with its one view.
@@ -83,6 +85,7 @@ impl Texture {
         let mut usage =
             wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
         usage.set(wgpu::TextureUsages::RENDER_ATTACHMENT, spec.drawn_to);
+        usage.set(wgpu::TextureUsages::STORAGE_BINDING, spec.stored_to);
         let raw = gpu.device().create_texture(&wgpu::TextureDescriptor {
             label: Some(spec.label),
             size: extent(size),

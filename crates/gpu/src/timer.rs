@@ -1,4 +1,7 @@
 //! Measures the device time of each pass.
+//!
+//! # When not to use it
+//! For a compute pass among render passes on Mesa's software driver (22.3): it may read about 0.
 
 use crate::{Buffer, Gpu, GpuError};
 

@@ -59,13 +59,39 @@ fn a_part_of_a_buffer_of_small_values_is_overwritten() {
 fn a_box_of_an_odd_sized_volume_comes_back() {
     let Some(gpu) = device() else { return };
     let size = [5, 3, 2];
-    let spec = TextureSpec { label: "volume", size, volume: true, format: Format::R16Float, drawn_to: false };
+    let spec = TextureSpec {
+        label: "volume",
+        size,
+        volume: true,
+        format: Format::R16Float,
+        drawn_to: false,
+        stored_to: false,
+    };
     let texture = Texture::new(&gpu, &spec).unwrap();
     texture.write(&gpu, [0; 3], size, &(0..30u16).collect::<Vec<_>>());
     texture.write(&gpu, [4, 1, 1], [1, 2, 1], &[100u16, 101]);
     let mut expected: Vec<u16> = (0..30).collect();
     (expected[15 + 5 + 4], expected[15 + 10 + 4]) = (100, 101);
     assert_eq!(texture.read::<u16>(&gpu).unwrap(), expected);
+    assert_eq!(gpu.faults(), Faults::default());
+}
+
+#[test]
+fn a_kernel_stores_to_a_texture() {
+    let Some(gpu) = device() else { return };
+    let wgsl = "@group(0) @binding(0) var to: texture_storage_2d<rgba8unorm, write>;
+        @compute @workgroup_size(2) fn main(@builtin(global_invocation_id) id: vec3u) {
+            textureStore(to, id.xy, vec4f(vec2f(id.xy), 0.0, 1.0));
+        }";
+    let (size, format) = ([2, 2, 1], Format::Rgba8Unorm);
+    let spec = TextureSpec { label: "stored", size, volume: false, format, drawn_to: false, stored_to: true };
+    let texture = Texture::new(&gpu, &spec).unwrap();
+    let kernel = Kernel::new(&gpu, "store", wgsl, "main", &[Slot::Store2(format)]).unwrap();
+    let mut recorder = gpu.record("test");
+    recorder.dispatch("store", &kernel, &kernel.bind(&gpu, &[(&texture).into()]).unwrap(), [1, 2, 1]);
+    recorder.submit();
+    let stored = [[0, 0, 0, 255], [255, 0, 0, 255], [0, 255, 0, 255], [255, 255, 0, 255]];
+    assert_eq!(texture.read::<[u8; 4]>(&gpu).unwrap(), stored);
     assert_eq!(gpu.faults(), Faults::default());
 }
 
@@ -93,7 +119,14 @@ fn the_nearer_of_two_triangles_is_seen_inside_the_scissor() {
     let pipeline = Pipeline::new(&gpu, &spec).unwrap();
     let depths = Buffer::from_slice(&gpu, "depths", &[0.5f32, 0.25]).unwrap();
     let bindings = pipeline.bind(&gpu, &[(&depths).into()]).unwrap();
-    let image = |format| TextureSpec { label: "image", size: [3, 2, 1], volume: false, format, drawn_to: true };
+    let image = |format| TextureSpec {
+        label: "image",
+        size: [3, 2, 1],
+        volume: false,
+        format,
+        drawn_to: true,
+        stored_to: false,
+    };
     let colour = Texture::new(&gpu, &image(Format::Rgba8Unorm)).unwrap();
     let depth = Texture::new(&gpu, &image(Format::Depth32Float)).unwrap();
     let mut recorder = gpu.record("test");
@@ -118,8 +151,14 @@ fn mistakes_come_back_as_errors() {
     assert!(matches!(kernel.bind(&gpu, &[]), Err(GpuError::Bind { .. })));
     let huge = Buffer::<u8>::zeroed(&gpu, "huge", usize::MAX / 4);
     assert!(matches!(huge, Err(GpuError::TooLarge { unit: "bytes", .. })));
-    let spec =
-        TextureSpec { label: "wide", size: [1 << 20, 1, 1], volume: false, format: Format::R8Unorm, drawn_to: false };
+    let spec = TextureSpec {
+        label: "wide",
+        size: [1 << 20, 1, 1],
+        volume: false,
+        format: Format::R8Unorm,
+        drawn_to: false,
+        stored_to: false,
+    };
     assert!(matches!(Texture::new(&gpu, &spec), Err(GpuError::TooLarge { .. })));
     assert_eq!(gpu.faults(), Faults::default());
 }

@@ -26,7 +26,8 @@ impl Mri {
     pub fn new(gpu: &Gpu, volume: Option<&VoxelVolume<f32>>, tint: Option<&[[u8; 3]]>) -> Result<Self, RenderError> {
         let signals = volume.map(|volume| Signals::of(volume, tint)).transpose()?;
         let size = signals.as_ref().map_or([1; 3], |g| g.dims.map(|n| n as u32));
-        let spec = TextureSpec { label: "mri", size, volume: true, format: Format::Rgba8Unorm, drawn_to: false };
+        let format = Format::Rgba8Unorm;
+        let spec = TextureSpec { label: "mri", size, volume: true, format, drawn_to: false, stored_to: false };
         let texture = Texture::new(gpu, &spec)?;
         if let Some(signals) = &signals {
             texture.write(gpu, [0; 3], size, &signals.texels);

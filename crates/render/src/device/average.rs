@@ -2,7 +2,8 @@
 //!
 //! # Practice
 //! Every pixel is drawn again for each sample, one sample a call: a graphics card has the time. The
-//! mean is kept in half precision, since shares of 1/16 would be lost in bytes.
+//! mean is kept in half precision, since shares of 1/16 would be lost in bytes. A sample is drawn
+//! in the picture, and the mean over it.
 
 use super::enlarge::{Enlarge, fill};
 use crate::RenderError;
@@ -17,12 +18,10 @@ pub(crate) struct Average {
     pipeline: Pipeline,
 }
 
-/// The textures of a view of some size.
+/// The mean of a view of some size.
 #[derive(Debug)]
 pub(crate) struct Mean {
     size: [u32; 2],
-    /// The newest sample.
-    pub sample: Texture,
     mean: Texture,
     /// Adds the sample to the mean; copies the mean into the picture.
     bindings: [Bindings; 2],
@@ -44,22 +43,21 @@ impl Average {
         Ok(Self { pipeline: Pipeline::new(gpu, &spec)? })
     }
 
-    /// Textures for a view of `size` pixels.
+    /// The mean of a view of `size` pixels in the upper left corner of the picture.
     pub fn mean(
         &self,
         gpu: &Gpu,
         scene: &Buffer<Scene>,
         enlarge: &Enlarge,
-        size: [u32; 2],
+        size @ [width, height]: [u32; 2],
+        picture: &Texture,
     ) -> Result<Mean, RenderError> {
-        let sheet = |label, format| {
-            let size = [size[0], size[1], 1];
-            Texture::new(gpu, &TextureSpec { label, size, volume: false, format, drawn_to: true })
-        };
-        let (sample, mean) = (sheet("sample", Format::Rgba8Unorm)?, sheet("mean", Format::Rgba16Float)?);
-        let add = self.pipeline.bind(gpu, &[scene.into(), (&sample).into()])?;
+        let (wide, format) = ([width, height, 1], Format::Rgba16Float);
+        let spec = TextureSpec { label: "mean", size: wide, volume: false, format, drawn_to: true, stored_to: false };
+        let mean = Texture::new(gpu, &spec)?;
+        let add = self.pipeline.bind(gpu, &[scene.into(), picture.into()])?;
         let bindings = [add, enlarge.bind(gpu, scene, &mean)?];
-        Ok(Mean { size, sample, mean, bindings, taken: 0 })
+        Ok(Mean { size, mean, bindings, taken: 0 })
     }
 
     /// Adds the sample to the mean, and shows it in an area of the picture.

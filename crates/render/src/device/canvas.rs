@@ -32,11 +32,13 @@ impl Canvas {
             return Err(RenderError::Size(width, height));
         }
         let layout = Layout::of(width, height, division.slices);
-        let sheet = |label, [width, height]: [u32; 2], format| {
-            Texture::new(gpu, &TextureSpec { label, size: [width, height, 1], volume: false, format, drawn_to: true })
+        let sheet = |label, [width, height]: [u32; 2], format, stored_to| {
+            let size = [width, height, 1];
+            Texture::new(gpu, &TextureSpec { label, size, volume: false, format, drawn_to: true, stored_to })
         };
+        let picture = sheet("picture", division.size, Format::Rgba8Unorm, true)?;
         let areas = StereoLook::areas(division.stereo, layout.view);
-        let eye = |(number, area)| Eye::new(gpu, number, area, &division, passes);
+        let eye = |(number, area)| Eye::new(gpu, number, area, &division, passes, &picture);
         let eyes = areas.into_iter().enumerate().map(eye).collect::<Result<Vec<_>, _>>()?;
         let anaglyph = match &eyes[..] {
             [Eye { apart: Some((left, _)), .. }, Eye { apart: Some((right, _)), .. }]
@@ -47,11 +49,11 @@ impl Canvas {
             _ => None,
         };
         let column = layout.slices.map_or([1, 1], |s| [s[0][2], height]);
-        let section = sheet("section", column, Format::Rgba32Uint)?;
+        let section = sheet("section", column, Format::Rgba32Uint, false)?;
         Ok(Self {
             division,
             layout,
-            picture: sheet("picture", division.size, Format::Rgba8Unorm)?,
+            picture,
             anaglyph,
             slices: bind_slices(gpu, passes, &section)?,
             eyes,
@@ -60,10 +62,10 @@ impl Canvas {
         })
     }
 
-    /// Binds the passes that read bone again, after its buffers changed.
+    /// Binds the passes that read bone or paint again, after their buffers or textures changed.
     pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes) -> Result<(), RenderError> {
         self.slices = bind_slices(gpu, passes, &self.section)?;
-        self.eyes.iter_mut().try_for_each(|eye| eye.rebind(gpu, passes))
+        self.eyes.iter_mut().try_for_each(|eye| eye.rebind(gpu, passes, &self.picture))
     }
 }
 

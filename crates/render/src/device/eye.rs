@@ -1,6 +1,6 @@
 //! The view of one eye: hits kept between pictures, bound to the passes.
 
-use super::light::Inputs;
+use super::light::Sheets;
 use super::passes::{Division, Passes};
 use crate::RenderError;
 use crate::bricks::NOTHING;
@@ -9,7 +9,7 @@ use crate::frame::Frame;
 use crate::recast::Recast;
 use crate::scene::Scene;
 use crate::stereo::StereoLook;
-use trepan_gpu::{Bindings, Depth, DrawTarget, Format, Gpu, Recorder, Target, Texture, TextureSpec};
+use trepan_gpu::{Bindings, Buffer, Depth, DrawTarget, Format, Gpu, Recorder, Target, Texture, TextureSpec};
 
 /// The textures of an eye.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub(crate) struct Eye {
     pub drawn: [u32; 2],
     pub skull_hit: Texture,
     pub recast: Recast,
+    /// Rectangle of pixels to cast.
+    part: Buffer<[u32; 4]>,
     brain_hit: Texture,
     brain_rest: Texture,
     depth: Texture,
@@ -42,36 +44,41 @@ impl Eye {
         area: [u32; 4],
         division: &Division,
         passes: &Passes,
+        picture: &Texture,
     ) -> Result<Self, RenderError> {
         let [x, y, width, height] = area;
         let drawn = [width, height].map(|n| ((n as f32 * division.detail).round() as u32).clamp(1, n));
         let whole = [x, y] == [0, 0] && drawn == [width, height] && division.stereo != Some(StereoLook::Anaglyph);
-        let sheet = |label, format| {
+        let sheet = |label, format, stored_to| {
             let size = [drawn[0], drawn[1], 1];
-            Texture::new(gpu, &TextureSpec { label, size, volume: false, format, drawn_to: true })
+            Texture::new(gpu, &TextureSpec { label, size, volume: false, format, drawn_to: true, stored_to })
         };
         let scene = &passes.scenes[number];
-        let skull_hit = sheet("skull hit", Format::Rgba32Uint)?;
-        let brain_hit = sheet("brain hit", Format::Rgba32Uint)?;
-        let brain_rest = sheet("brain rest", Format::Rgba32Uint)?;
+        let skull_hit = sheet("skull hit", Format::Rgba32Uint, true)?;
+        let brain_hit = sheet("brain hit", Format::Rgba32Uint, false)?;
+        let brain_rest = sheet("brain rest", Format::Rgba32Uint, false)?;
         let separate = |texture: Texture| -> Result<_, RenderError> {
             let bindings = passes.enlarge.bind(gpu, scene, &texture)?;
             Ok((texture, bindings))
         };
-        let apart = (!whole).then(|| separate(sheet("apart", Format::Rgba8Unorm)?)).transpose()?;
+        let apart = (!whole).then(|| separate(sheet("apart", Format::Rgba8Unorm, true)?)).transpose()?;
         let brain = passes
             .brain
             .as_ref()
             .map(|(brain, face)| -> Result<_, RenderError> { Ok([brain.bind(gpu, scene)?, face.bind(gpu, scene)?]) });
+        let part = Buffer::zeroed(gpu, "part", 1)?;
+        let lit = apart.as_ref().map_or(picture, |(texture, _)| texture);
+        let light = passes.light.bind(gpu, scene, &sheets([&skull_hit, &brain_hit, &brain_rest, lit], passes))?;
         Ok(Self {
             number,
             area,
             drawn,
             recast: Recast::default(),
-            depth: sheet("depth", Format::Depth32Float)?,
+            depth: sheet("depth", Format::Depth32Float, false)?,
             apart,
-            skull: passes.skull.bind(gpu, scene)?,
-            light: passes.light.bind(gpu, scene, &inputs(&skull_hit, &brain_hit, &brain_rest, passes))?,
+            skull: passes.skull.bind(gpu, scene, &part, &skull_hit)?,
+            light,
+            part,
             overlay: passes.overlay.bind(gpu, scene, &skull_hit, &brain_hit)?,
             brain: brain.transpose()?,
             skull_hit,
@@ -81,10 +88,11 @@ impl Eye {
     }
 
     /// Rebinds bone and lighting, after a paint's texture or the bone's buffers changed.
-    pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes) -> Result<(), RenderError> {
-        self.skull = passes.skull.bind(gpu, &passes.scenes[self.number])?;
-        let inputs = inputs(&self.skull_hit, &self.brain_hit, &self.brain_rest, passes);
-        self.light = passes.light.bind(gpu, &passes.scenes[self.number], &inputs)?;
+    pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes, picture: &Texture) -> Result<(), RenderError> {
+        let scene = &passes.scenes[self.number];
+        self.skull = passes.skull.bind(gpu, scene, &self.part, &self.skull_hit)?;
+        let sheets = sheets([&self.skull_hit, &self.brain_hit, &self.brain_rest, self.lit(picture)], passes);
+        self.light = passes.light.bind(gpu, scene, &sheets)?;
         Ok(())
     }
 
@@ -100,11 +108,15 @@ impl Eye {
     ) -> u32 {
         self.draw_brain(recorder, passes, frame.show_brain);
         let pixels_cast = self.cast(recorder, passes, frame.show_bone, seen, view);
-        let ([w, h], area) = (self.drawn, self.area);
-        let (texture, area) = self.apart.as_ref().map_or((picture, area), |(texture, _)| (texture, [0, 0, w, h]));
-        passes.light.draw(recorder, &self.light, area, texture);
-        passes.overlay.draw(recorder, &self.overlay, area, texture);
+        let [w, h] = self.drawn;
+        passes.light.draw(recorder, &self.light, self.drawn);
+        passes.overlay.draw(recorder, &self.overlay, [0, 0, w, h], self.lit(picture));
         pixels_cast
+    }
+
+    /// The texture in whose upper left corner the view is lit.
+    fn lit<'a>(&'a self, picture: &'a Texture) -> &'a Texture {
+        self.apart.as_ref().map_or(picture, |(texture, _)| texture)
     }
 
     fn draw_brain(&self, recorder: &mut Recorder, passes: &Passes, shown: bool) {
@@ -126,20 +138,17 @@ impl Eye {
             return 0;
         }
         let Some(part) = self.recast.part(view, seen.bone_cut, self.drawn) else { return 0 };
-        passes.skull.cast(recorder, &self.skull, part, &self.skull_hit);
-        part[2] * part[3]
+        let [_, _, width, height] = part;
+        self.part.write(recorder.gpu(), 0, &[part]);
+        passes.skull.cast(recorder, &self.skull, [width, height]);
+        width * height
     }
 }
 
-fn inputs<'a>(
-    skull_hit: &'a Texture,
-    brain_hit: &'a Texture,
-    brain_rest: &'a Texture,
-    passes: &'a Passes,
-) -> Inputs<'a> {
+fn sheets<'a>([skull_hit, brain_hit, brain_rest, picture]: [&'a Texture; 4], passes: &'a Passes) -> Sheets<'a> {
     let [bone_coat, brain_coat] = passes.coats.each_ref().map(|coat| &coat.texture);
     let mri = &passes.mri.texture;
-    Inputs { skull_hit, brain_hit, brain_rest, mri, skull: &passes.skull, bone_coat, brain_coat }
+    Sheets { skull_hit, brain_hit, brain_rest, mri, skull: &passes.skull, bone_coat, brain_coat, picture }
 }
 
 /// Fills a texture.

@@ -36,5 +36,6 @@ impl Coat {
 }
 
 fn texture(gpu: &Gpu, label: &'static str, size: [u32; 3]) -> Result<Texture, RenderError> {
-    Ok(Texture::new(gpu, &TextureSpec { label, size, volume: true, format: Format::Rgba8Unorm, drawn_to: false })?)
+    let format = Format::Rgba8Unorm;
+    Ok(Texture::new(gpu, &TextureSpec { label, size, volume: true, format, drawn_to: false, stored_to: false })?)
 }

@@ -114,8 +114,8 @@ impl Renderer {
         for (coat, paint) in self.passes.coats.iter_mut().zip([frame.bone_paint, frame.brain_paint]) {
             other |= coat.follow(&self.gpu, paint)?;
         }
-        for eye in self.canvas.eyes.iter_mut().filter(|_| other) {
-            eye.rebind(&self.gpu, &self.passes)?;
+        if other {
+            self.canvas.rebind(&self.gpu, &self.passes)?;
         }
         Ok(self.passes.overlay.follow(&self.gpu, &frame.overlay, self.view(frame).eye))
     }
@@ -175,14 +175,14 @@ impl Renderer {
         }
         let mean = match mean {
             Some(mean) => mean,
-            None => mean.insert(passes.average.mean(&gpu, &passes.scenes[0], &passes.enlarge, eye.drawn)?),
+            None => mean.insert(passes.average.mean(&gpu, &passes.scenes[0], &passes.enlarge, eye.drawn, picture)?),
         };
         let view = eye_view(frame, eye.area, 0).sample(mean.taken, eye.drawn);
         let mut scene = Scene::of(frame, &view, eye.drawn, &passes.skull.grid, passes.mri.texture_from_world);
         scene.spin.w = 1.0 / (mean.taken + 1) as f32;
         passes.scenes[0].write(&gpu, 0, &[scene]);
         let mut recorder = gpu.record("sample");
-        eye.draw(&mut recorder, passes, frame, &scene, &view, &mean.sample);
+        eye.draw(&mut recorder, passes, frame, &scene, &view, picture);
         passes.average.draw(&mut recorder, mean, &passes.enlarge, eye.area, picture);
         recorder.submit();
         Ok(true)

@@ -6,6 +6,7 @@
 //! found exactly (Marmitt et al. 2004), and no thin wall is missed. See `skull.wgsl`.
 //!
 //! # Practice
+//! A compute pass: cards for data centres run fragment shaders on only a few of their processors.
 //! Half-precision densities are exact for integer HU up to 2048, which covers every useful
 //! isovalue. The hits of the last picture are kept. With a static camera only the part of the
 //! picture that shows changed bricks is cast again, and all of it once drilling stops, since
@@ -16,10 +17,7 @@ use crate::bricks::{Followed, Grid, Leaps, densities};
 use crate::scene::Scene;
 use crate::smooth::Smooth;
 use std::sync::Arc;
-use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
-    TextureSpec, Topology,
-};
+use trepan_gpu::{Bindings, Buffer, Format, Gpu, Kernel, Recorder, Resource, Slot, Texture, TextureSpec};
 use trepan_volume::BoneVolume;
 
 /// Bytes of densities uploaded at once while loading.
@@ -42,7 +40,7 @@ pub(crate) struct Skull {
     crowd: Texture,
     /// Table and depths of what was cut.
     drilled: (Buffer<u32>, Buffer<[i16; 2]>),
-    pipeline: Pipeline,
+    kernel: Kernel,
     leaping: bool,
 }
 
@@ -52,10 +50,8 @@ impl Skull {
         let seen = bone.as_ref().map_or_else(Vec::new, |bone| bone.seen());
         let leaps = Leaps::of(bone.as_deref(), &grid);
         let volume = |label, size: [usize; 3], format| {
-            Texture::new(
-                gpu,
-                &TextureSpec { label, size: size.map(|n| n as u32), volume: true, format, drawn_to: false },
-            )
+            let size = size.map(|n| n as u32);
+            Texture::new(gpu, &TextureSpec { label, size, volume: true, format, drawn_to: false, stored_to: false })
         };
         let density = volume("density", grid.dims, Format::R16Float)?;
         let smooth = Smooth::of(bone.as_deref(), &grid);
@@ -64,21 +60,11 @@ impl Skull {
         let crowd = volume("crowd", grid.blocks(), Format::R8Unorm)?;
         let table = Buffer::from_slice(gpu, "drilled table", &leaps.drilled.table)?;
         let depths = Buffer::from_slice(gpu, "drilled depths", bytemuck::cast_slice(&leaps.drilled.depths))?;
-        let slots = [&[Slot::Uniform], &VOLUMES[..], &[Slot::Texture3]].concat();
-        let pipeline = Pipeline::new(
-            gpu,
-            &PipelineSpec {
-                label: "skull",
-                wgsl: trepan_shaders::RENDER_SKULL,
-                slots: &slots,
-                targets: &[Format::Rgba32Uint],
-                depth: false,
-                blend: false,
-                topology: Topology::Triangles,
-            },
-        )?;
+        let own = [Slot::Texture3, Slot::Uniform, Slot::Store2(Format::Rgba32Uint)];
+        let slots = [&[Slot::Uniform], &VOLUMES[..], &own].concat();
+        let kernel = Kernel::new(gpu, "skull", trepan_shaders::RENDER_SKULL, "main", &slots)?;
         let (drilled, smooth) = ((table, depths), (smooth, smooth_texture));
-        let skull = Self { bone, grid, leaps, seen, density, smooth, leap, crowd, drilled, pipeline, leaping: true };
+        let skull = Self { bone, grid, leaps, seen, density, smooth, leap, crowd, drilled, kernel, leaping: true };
         skull.load(gpu);
         Ok(skull)
     }
@@ -194,17 +180,25 @@ impl Skull {
         [(&self.drilled.0).into(), (&self.drilled.1).into()]
     }
 
-    /// Binds the pass to the frame's uniform.
-    pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
-        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &self.volumes()[..], &[(&self.smooth.1).into()]].concat())?)
+    /// Binds the pass to the frame's uniform, the rectangle of pixels to cast, and their hits.
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        scene: &Buffer<Scene>,
+        part: &Buffer<[u32; 4]>,
+        hits: &Texture,
+    ) -> Result<Bindings, RenderError> {
+        let own = [(&self.smooth.1).into(), part.into(), hits.into()];
+        Ok(self.kernel.bind(gpu, &[&[scene.into()], &self.volumes()[..], &own].concat())?)
     }
 
-    /// Casts some of the pixels again into `hits`.
-    pub fn cast(&self, recorder: &mut Recorder, bindings: &Bindings, part: [u32; 4], hits: &Texture) {
-        let colours = [Target { texture: hits, clear: None }];
-        recorder.draw("skull", &DrawTarget { colours: &colours, depth: None }, |d| {
-            d.scissor(part);
-            d.draw(&self.pipeline, bindings, 3);
-        });
+    /// Casts the bound part, of `size` pixels, again.
+    pub fn cast(&self, recorder: &mut Recorder, bindings: &Bindings, size: [u32; 2]) {
+        recorder.dispatch("skull", &self.kernel, bindings, tiles(size));
     }
+}
+
+/// Workgroups of 8x8 threads, one a pixel, that cover so many pixels.
+pub(crate) fn tiles([width, height]: [u32; 2]) -> [u32; 3] {
+    [width.div_ceil(8), height.div_ceil(8), 1]
 }
