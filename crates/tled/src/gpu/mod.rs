@@ -37,9 +37,10 @@
 //! ```
 //!
 //! # When not to use it
-//! Small meshes (the processor needs 0.3 ms for 22 thousand tetrahedra). Bodies without supports
-//! that are damped: they are refused with the field's name, and [`Tled`](crate::Tled) has them, as
-//! it has pressure on surfaces, moved nodes and [`settle`](crate::Tled::settle).
+//! Small meshes, where several threads are faster (see the README). Dynamic mass scaling is not
+//! applied: substeps get shorter instead. Bodies without supports that are damped: they are refused
+//! with the field's name, and [`Tled`](crate::Tled) has them, as it has pressure on surfaces, moved
+//! nodes and [`settle`](crate::Tled::settle).
 
 mod device_state;
 mod forces;
@@ -278,8 +279,8 @@ impl GpuTled {
         volumes.chain(forces).chain(press).chain([("update", &self.update)])
     }
 
-    /// Runs `count` further steps, at most 256, of the last length and loads and returns the
-    /// device's own time: of all together, µs, and of each pass of one more step. Empty where the
+    /// Runs `count` further steps, at most 256, like the last one, and returns the device's time.
+    /// That is of all together, µs, and of each pass of one more step; NaN and nothing where the
     /// device has no clock.
     pub fn timed(&mut self, count: u32) -> Result<(f64, Vec<PassTime>), GpuError> {
         let presses = self.press.presses();
@@ -294,7 +295,7 @@ impl GpuTled {
         Ok((all.us, times))
     }
 
-    /// The uniform of a step, and whether what pushed before must be cleared; hands the springs over.
+    /// Hands the springs over; returns the uniform, and whether what pushed before must be cleared.
     fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> (Step, bool) {
         let Base { config, layout, rest, max_displacement_mm, .. } = &self.base;
         let (press, state, place_of) = (&mut self.press, &self.state, &layout.place_of);

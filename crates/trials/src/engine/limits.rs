@@ -90,7 +90,8 @@ pub enum Run {
 
 /// Path of a suite's register.
 fn place(suite: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("limits").join(format!("{suite}.toml"))
+    let sources = || Path::new(env!("CARGO_MANIFEST_DIR")).join("limits");
+    trepan_fixtures::beside_program("limits").unwrap_or_else(sources).join(format!("{suite}.toml"))
 }
 
 /// Whether a value is on the allowed side of a limit.

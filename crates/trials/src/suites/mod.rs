@@ -2,6 +2,7 @@
 
 mod ablation;
 pub mod budget;
+mod card;
 mod claims;
 mod conditions;
 pub mod deformable;
@@ -28,8 +29,16 @@ mod voxel_size;
 use crate::engine::part::nothing_more;
 pub use crate::engine::part::{Part, Scope, Suite};
 
-/// Suites that run only when named: they download other programs, or take an hour.
+/// Suites that run only when named: they need a graphics card,
+/// download other programs, or take an hour.
 pub const ON_REQUEST: &[Suite] = &[
+    Suite {
+        name: "card",
+        question: "what do tissue and pictures cost on this machine's graphics card, and do they agree with the processor",
+        chart: ("wall_us", "tetrahedron_steps_per_s"),
+        parts: card::parts,
+        judge: card::judge,
+    },
     Suite {
         name: "population",
         question: "do heads that no one has seen open, keep still and warn rightly, by every quality",

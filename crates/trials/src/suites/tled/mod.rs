@@ -3,7 +3,6 @@
 mod axial;
 mod classes;
 pub(super) mod closed_forms;
-mod device;
 mod fronts;
 mod locking;
 mod motion;
@@ -15,7 +14,7 @@ pub(super) mod slender;
 mod speed;
 pub(super) mod stability;
 
-use super::{Part, Scope};
+use super::{Part, Scope, card};
 use crate::engine::suite::Findings;
 
 /// Every scene.
@@ -24,7 +23,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.push(Part::new("closed forms", |_, findings| closed_forms::run(findings)));
     parts.extend(locking::parts(scope));
     parts.extend(motion::parts());
-    parts.extend([Part::new("region", region::run), Part::new("device", device::run)]);
+    parts.extend([Part::new("region", region::run), card::agreement("device")]);
     parts.extend(axial::parts());
     parts.extend(outside::parts());
     parts.push(Part::new("tissue classes", classes::run));
