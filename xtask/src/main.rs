@@ -1,5 +1,7 @@
-//! The project's own commands: `cargo xtask test | validate | merge | compare | layers | tidy`.
+//! The project's own commands: `cargo xtask test | validate | merge | compare | bundle | layers |
+//! tidy`.
 
+mod bundle;
 mod constants;
 mod layers;
 mod merge;
@@ -27,7 +29,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Task {
     /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc
-    /// tests, docs, the quick validation
+    /// tests, docs, the quick validation, the bundle for a graphics card
     Test,
     /// Run validation suites in release mode; writes SUITE.json and index.html
     Validate {
@@ -58,6 +60,15 @@ enum Task {
         /// Passed on: --write to write fixtures/measurements/fits.csv, --out DIR
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
+    },
+    /// Make a folder that measures a graphics card on any x86-64 Linux with a Vulkan driver
+    Bundle {
+        /// What is bundled
+        #[arg(value_parser = ["gpu"])]
+        what: String,
+        /// The folder, which must not exist yet
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
     },
     /// Check that every arrow between crates points down and that each crate does only what is its
     /// to do
@@ -95,6 +106,7 @@ fn run() -> Result<()> {
             let arguments = std::iter::once("calibrate".into()).chain(arguments);
             validate(&arguments.collect::<Vec<String>>())
         }
+        Task::Bundle { out, .. } => bundle::gpu(&root(), &out),
         Task::Layers => report("layers", layers::check(&root())?),
         Task::Tidy => report("tidy", tidy(&root())?),
     }
@@ -129,6 +141,7 @@ fn test() -> Result<()> {
     cargo(&["test", "--workspace", "--doc", "--quiet"], &[])?;
     documentation()?;
     validation::check(&root())?;
+    bundle::check(&root())?;
     println!("xtask test: all passed");
     Ok(())
 }
