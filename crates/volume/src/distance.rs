@@ -55,17 +55,23 @@ impl DistanceField {
     ///
     /// An empty mask gives [`FAR_MM`] everywhere, a full one minus that.
     pub fn of_mask(mask: &VoxelVolume<u8>) -> Self {
-        Self::of(mask, |at| if mask.data[at] != 0 { 1.0 } else { -1.0 })
+        Self::of_mask_within(mask, FAR_MM)
+    }
+
+    /// The same for distances up to a reach; larger ones are at least that. A short reach costs
+    /// less.
+    pub fn of_mask_within(mask: &VoxelVolume<u8>, reach_mm: f32) -> Self {
+        Self::of(mask, |at| if mask.data[at] != 0 { 1.0 } else { -1.0 }, reach_mm)
     }
 
     /// The distance to the isosurface at `level`, with sub-voxel accuracy; inside is at or over it.
     pub fn of_level<T: Sample>(volume: &VoxelVolume<T>, level: f32) -> Self {
-        Self::of(volume, |at| volume.data[at].to_f32() - level)
+        Self::of(volume, |at| volume.data[at].to_f32() - level, FAR_MM)
     }
 
     /// `inside` returns a voxel's value above the level.
-    fn of<T: Sample>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
-        let data = signed(grid.dims, grid.spacing_mm(), inside);
+    fn of<T: Sample>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync, reach_mm: f32) -> Self {
+        let data = signed(grid.dims, grid.spacing_mm(), inside, reach_mm);
         Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
     }
 
@@ -95,7 +101,7 @@ impl DistanceField {
                 seen[2].start + at / (size[0] * size[1]),
             ]
         };
-        let fresh = signed(size, spacing, |at| inside(place(at)));
+        let fresh = signed(size, spacing, |at| inside(place(at)), FAR_MM);
         for k in set[2].clone() {
             for j in set[1].clone() {
                 let from = set[0].start - seen[0].start + size[0] * (j - seen[1].start + size[1] * (k - seen[2].start));
@@ -151,12 +157,15 @@ impl DistanceField {
 /// The distance if there is no surface, mm.
 pub const FAR_MM: f32 = 1e6;
 
-/// Distances at the voxels, negative where `inside` is 0 or more, mm.
-fn signed(dims: [usize; 3], spacing: DVec3, inside: impl Fn(usize) -> f32 + Sync) -> Vec<f32> {
-    let mut data = squared_distances(dims, spacing, &inside);
-    for (at, foot) in feet(dims, spacing, &inside) {
-        splat(dims, spacing, at, foot, &mut data);
-    }
+/// Distances at the voxels, negative where `inside` is 0 or more, mm; exact up to a reach.
+fn signed(dims: [usize; 3], spacing: DVec3, inside: impl Fn(usize) -> f32 + Sync, reach_mm: f32) -> Vec<f32> {
+    let mut data = squared_distances(dims, spacing, &inside, reach_mm);
+    let (feet, slice) = (feet(dims, spacing, &inside), (dims[0] * dims[1]).max(1));
+    data.par_chunks_mut(slice).enumerate().for_each(|(k, squared)| {
+        let first = feet.partition_point(|(at, _)| at / slice + 2 < k);
+        let near = feet[first..].iter().take_while(|(at, _)| at / slice <= k + 2);
+        near.for_each(|&(at, foot)| splat(dims, spacing, (at, foot), k, squared));
+    });
     data.par_iter_mut().enumerate().for_each(|(at, d)| {
         let far = d.sqrt().min(FAR_MM);
         *d = if inside(at) >= 0.0 { -far } else { far };
@@ -167,44 +176,55 @@ fn signed(dims: [usize; 3], spacing: DVec3, inside: impl Fn(usize) -> f32 + Sync
 /// Foot points of all voxels with an edge that crosses the surface, from the centre, mm.
 fn feet(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<(usize, DVec3)> {
     let steps = [1, dims[0], dims[0] * dims[1]];
-    let foot = |at: usize| {
+    let foot = |at: usize, place: [usize; 3]| {
         let own = inside(at);
         let mut n = DVec3::ZERO;
         for axis in 0..3 {
-            let place = at / steps[axis] % dims[axis];
-            let before = (place > 0).then(|| (-1.0, inside(at - steps[axis])));
-            let after = (place + 1 < dims[axis]).then(|| (1.0, inside(at + steps[axis])));
+            let before = (place[axis] > 0).then(|| (-1.0, inside(at - steps[axis])));
+            let after = (place[axis] + 1 < dims[axis]).then(|| (1.0, inside(at + steps[axis])));
             for (side, other) in [before, after].into_iter().flatten() {
+                if (other >= 0.0) == (own >= 0.0) {
+                    continue;
+                }
                 let part = f64::from(own / (own - other)).max(1e-6);
-                let wanted = (other >= 0.0) != (own >= 0.0) && part.is_finite();
-                if wanted && (part * spacing[axis]).recip() > n[axis].abs() {
+                if part.is_finite() && (part * spacing[axis]).recip() > n[axis].abs() {
                     n[axis] = side / (part * spacing[axis]);
                 }
             }
         }
         (n != DVec3::ZERO).then(|| (at, n / n.length_squared()))
     };
-    (0..dims.iter().product()).into_par_iter().filter_map(foot).collect()
+    let row = |row: usize| {
+        let [j, k] = [row % dims[1], row / dims[1]];
+        (0..dims[0]).filter_map(move |i| foot(row * dims[0] + i, [i, j, k])).collect::<Vec<_>>()
+    };
+    (0..dims[1] * dims[2]).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// Lowers the squared distances of the voxels within two of a foot point to the distance to it.
-fn splat(dims: [usize; 3], spacing: DVec3, at: usize, foot: DVec3, squared: &mut [f32]) {
+/// Lowers the squared distances of the voxels of slice `k` within two of a foot point to the
+/// distance to it.
+fn splat(dims: [usize; 3], spacing: DVec3, (at, foot): (usize, DVec3), k: usize, squared: &mut [f32]) {
     let place = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
     let range = |axis: usize| place[axis].saturating_sub(2)..(place[axis] + 3).min(dims[axis]);
     let away = |axis: usize, n: usize| ((n as f64 - place[axis] as f64) * spacing[axis] - foot[axis]).powi(2);
-    for k in range(2) {
-        for j in range(1) {
-            let row = away(2, k) + away(1, j);
-            for i in range(0) {
-                let to = &mut squared[i + dims[0] * (j + dims[1] * k)];
-                *to = to.min((row + away(0, i)) as f32);
-            }
+    for j in range(1) {
+        let row = away(2, k) + away(1, j);
+        for i in range(0) {
+            let to = &mut squared[i + dims[0] * j];
+            *to = to.min((row + away(0, i)) as f32);
         }
     }
 }
 
-/// Squared distances to the nearest crossing, mm².
-fn squared_distances(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<f32> {
+/// Squared distances to the nearest crossing, mm²; what is beyond the reach is not followed.
+fn squared_distances(
+    dims: [usize; 3],
+    spacing: DVec3,
+    inside: &(impl Fn(usize) -> f32 + Sync),
+    reach_mm: f32,
+) -> Vec<f32> {
+    // No part of a sum of squares exceeds it.
+    let most = reach_mm * reach_mm;
     let crossings = |axis: usize| {
         along(dims, axis, |line, envelope, out| {
             envelope.clear();
@@ -224,7 +244,10 @@ fn squared_distances(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) 
         along(dims, axis, |line, envelope, out| {
             envelope.clear();
             for n in 0..line.length {
-                envelope.add(n as f64 * spacing[axis], field[line.at(n)]);
+                let height = field[line.at(n)];
+                if height <= most {
+                    envelope.add(n as f64 * spacing[axis], height);
+                }
             }
             envelope.read(spacing[axis], out);
         })
@@ -481,5 +504,22 @@ mod tests {
         assert!((field.sample(Vec3::new(1.1, 0.7, 0.6)) + 1.65).abs() < 1e-6);
         assert!(field.gradient(Vec3::new(3.0, 0.7, 0.6)).distance(Vec3::X) < 1e-6);
         assert_eq!(field.sample(Vec3::new(99.0, 0.0, 0.0)), field.sample(Vec3::new(5.5, 0.0, 0.0)));
+    }
+
+    #[test]
+    fn a_reach_changes_only_what_is_beyond_it() {
+        let mut mask = VoxelVolume::isotropic([40, 31, 27], Vec3::ZERO, 0.7, 0u8);
+        for at in 0..mask.data.len() {
+            let p = mask.centre_of([at % 40, at / 40 % 31, at / 1240]).as_vec3();
+            mask.data[at] = u8::from((0.6 * p.x).sin() + (0.5 * p.y).cos() > 0.3 && p.z < 12.0 && p.x < 20.0);
+        }
+        let whole = DistanceField::of_mask(&mask);
+        for reach in [0.5, 2.0, 5.5] {
+            let near = DistanceField::of_mask_within(&mask, reach);
+            for (a, b) in near.values.data.iter().zip(&whole.values.data) {
+                let same = a.to_bits() == b.to_bits();
+                assert!(same || b.abs() > reach && a.abs() > reach && (*a < 0.0) == (*b < 0.0), "{reach}: {a}, {b}");
+            }
+        }
     }
 }

@@ -9,28 +9,33 @@ use super::{extent, part_of};
 use crate::component::Components;
 use crate::{DistanceField, Grid, VoxelVolume, largest_component};
 
+/// More than what a distance is rounded by, mm.
+const SPARE_MM: f32 = 0.1;
+
+fn eroded(mask: &VoxelVolume<u8>, radius_mm: f32) -> VoxelVolume<u8> {
+    DistanceField::of_mask_within(mask, radius_mm + SPARE_MM).values().map(|d| u8::from(d < -radius_mm))
+}
+
+fn dilated(mask: &VoxelVolume<u8>, radius_mm: f32) -> VoxelVolume<u8> {
+    DistanceField::of_mask_within(mask, radius_mm + SPARE_MM).values().map(|d| u8::from(d < radius_mm))
+}
+
 /// The largest piece after erosion; `None` if nothing is left.
 pub(super) fn core(mask: &VoxelVolume<u8>, radius_mm: f32) -> Option<VoxelVolume<u8>> {
-    let core = in_box(mask, 0.0, |mask| {
-        largest_component(&DistanceField::of_mask(mask).values().map(|d| u8::from(d < -radius_mm)))
-    });
+    let core = in_box(mask, 0.0, |mask| largest_component(&eroded(mask, radius_mm)));
     core.data.contains(&1).then_some(core)
 }
 
 /// The voxels within `radius_mm` of a mask that are `allowed`.
 pub(super) fn within(mask: &VoxelVolume<u8>, radius_mm: f32, allowed: impl Fn(usize) -> bool) -> VoxelVolume<u8> {
-    let mut near =
-        in_box(mask, radius_mm, |mask| DistanceField::of_mask(mask).values().map(|d| u8::from(d < radius_mm)));
+    let mut near = in_box(mask, radius_mm, |mask| dilated(mask, radius_mm));
     near.data.iter_mut().enumerate().for_each(|(at, near)| *near &= u8::from(*near != 0 && allowed(at)));
     near
 }
 
 /// Closes gaps narrower than twice the radius, and holes.
 pub(super) fn closed(mask: &VoxelVolume<u8>, radius_mm: f32) -> VoxelVolume<u8> {
-    in_box(mask, radius_mm, |mask| {
-        let wide = DistanceField::of_mask(mask).values().map(|d| u8::from(d < radius_mm));
-        filled(&DistanceField::of_mask(&wide).values().map(|d| u8::from(d < -radius_mm)))
-    })
+    in_box(mask, radius_mm, |mask| filled(&eroded(&dilated(mask, radius_mm), radius_mm)))
 }
 
 /// Voxels between what an operation sets and the border of its box, which has no surface.
