@@ -44,13 +44,18 @@ where the packages `mujoco-warp` and `warp-lang` are installed; `measure` has th
 
 /// Builds, copies and measures the folder.
 pub fn gpu(root: &Path, out: &Path) -> Result<()> {
+    make(root, out, ("release", &["--release"]))
+}
+
+/// With the build folder and the flags of a profile.
+fn make(root: &Path, out: &Path, (profile, flags): (&str, &[&str])) -> Result<()> {
     ensure!(!out.exists(), "{}: is there already; name a new folder", out.display());
-    super::cargo(&["build", "--release", "--package", "trepan-trials", "--bin", "measure"], &[])?;
+    super::cargo(&[&["build", "--package", "trepan-trials", "--bin", "measure"], flags].concat(), &[])?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), Into::into);
     let (bin, lib) = (out.join("bin"), out.join("lib"));
     [&bin, &lib].into_iter().try_for_each(fs::create_dir_all)?;
     let mut strip = Command::new("strip");
-    strip.arg("-o").arg(bin.join("measure")).arg(target.join("release/measure"));
+    strip.arg("-o").arg(bin.join("measure")).arg(target.join(profile).join("measure"));
     ensure!(strip.status().context("strip, of binutils")?.success(), "strip failed");
     copy(&root.join("fixtures/case-head"), &bin.join("fixtures/case-head"))?;
     copy(&root.join("crates/trials/limits"), &bin.join("limits"))?;
@@ -70,9 +75,10 @@ pub fn gpu(root: &Path, out: &Path) -> Result<()> {
 }
 
 /// Makes the bundle and runs it as a stranger would: no environment, another home, another folder.
+/// In the profile of the tests, which is built already.
 pub fn check(root: &Path) -> Result<()> {
     let place = std::env::temp_dir().join(format!("trepan-bundle-{}", std::process::id()));
-    let made = gpu(root, &place.join("bundle")).and_then(|()| {
+    let made = make(root, &place.join("bundle"), ("debug", &[])).and_then(|()| {
         let mut measure = Command::new(place.join("bundle/measure"));
         measure.args(["--software", "--quick", "agreement"]).current_dir(&place);
         measure.env_clear().envs([("HOME", &place), ("PATH", &"/usr/bin:/bin".into())]);
