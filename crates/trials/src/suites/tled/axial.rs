@@ -41,9 +41,9 @@ const REST_MS: u32 = 200;
 const STILL_MS: usize = 50;
 /// Force from which its direction counts, N.
 const FELT_N: f32 = 0.01;
-/// A session's share of added mass is one of the whole brain, and nearly all of it lies on the small
-/// elements at the opening. With so many times that share the block's top is as heavy: its stable
-/// step is that of a session's mesh of 12,000 tetrahedra, 0.24 ms.
+/// A session's share of added mass is one of the whole brain, and nearly all of it lies on the
+/// small elements at the opening. With so many times that share the block's top is as heavy: its
+/// stable step is that of a session's mesh of 12,000 tetrahedra, 0.24 ms.
 const BRAIN_OVER_BLOCK: f32 = 6.0;
 /// The middle of the block's top lies so far from the tool's way, mm: no node is special.
 const ASIDE: Vec3 = Vec3::new(0.31, 0.17, 0.0);
