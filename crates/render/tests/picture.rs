@@ -175,6 +175,17 @@ fn the_same_frame_gives_the_same_bytes() {
 }
 
 #[test]
+fn a_finished_picture_says_what_the_device_took() {
+    let Some(gpu) = device() else { return };
+    let ball = bone(40, |p| p.length() - 12.0);
+    let data = SceneData { bone: Some(ball), brain: None, mri: None, tint: None };
+    let mut renderer = renderer(&gpu, &data, [320, 240]);
+    assert_eq!(renderer.took_s(), 0.0);
+    picture(&mut renderer, &Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::ONE, 90.0)));
+    assert!(renderer.took_s() > 0.0);
+}
+
+#[test]
 fn a_coarser_view_looks_like_the_fine_one_and_leaves_the_slices_alone() {
     let Some(gpu) = device() else { return };
     let ball = bone(40, |p| p.length() - 12.0);

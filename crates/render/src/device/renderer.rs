@@ -27,6 +27,9 @@ use crate::report::{BRICKS_PER_FRAME, DrawReport, Hit, LEAST_DETAIL, OUTLINE, ey
 use crate::scene::Scene;
 use crate::slice::Plane;
 use glam::Vec3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Instant;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Buffer, Gpu, PassTime, Recorder, Texture, Timer};
 
@@ -40,6 +43,8 @@ pub struct Renderer {
     canvas: Canvas,
     bounds: Aabb,
     timer: Option<Timer>,
+    /// From the submission of the newest finished picture to its end, µs.
+    took_us: Arc<AtomicU32>,
     /// Most changed bricks processed per picture; the rest follows in the next pictures.
     pub bricks_per_frame: usize,
 }
@@ -74,6 +79,7 @@ impl Renderer {
             contour,
             canvas,
             timer: Timer::new(gpu, 16)?,
+            took_us: Arc::default(),
             bricks_per_frame: BRICKS_PER_FRAME,
         })
     }
@@ -97,6 +103,9 @@ impl Renderer {
         let pixels_cast = self.draw_views(&mut recorder, frame);
         self.draw_slices(&mut recorder);
         recorder.submit();
+        let (took_us, begun) = (Arc::clone(&self.took_us), Instant::now());
+        let tell = move || took_us.store(begun.elapsed().as_micros().min(u32::MAX.into()) as u32, Ordering::Relaxed);
+        self.gpu.queue().on_submitted_work_done(tell);
         self.timer = timer;
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
     }
@@ -243,6 +252,11 @@ impl Renderer {
     pub fn view(&self, frame: &Frame) -> View {
         let [_, _, width, height] = self.canvas.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)
+    }
+
+    /// Time that the device took for the newest picture known to be finished, s; 0 before the first.
+    pub fn took_s(&self) -> f64 {
+        1e-6 * f64::from(self.took_us.load(Ordering::Relaxed))
     }
 
     /// The box that the slices show, world mm.

@@ -21,6 +21,11 @@ pub trait Draws {
     /// The device in use, if any.
     fn device(&self) -> Option<&Gpu>;
 
+    /// Time that the device took for the newest finished picture, s; 0 where none draws.
+    fn took_s(&self) -> f64 {
+        0.0
+    }
+
     /// Draws a frame for an area of `size` pixels into a texture of the device; returns the camera
     /// as vectors.
     /// `detail` is the fraction of the 3-D view's pixels along an edge.
@@ -51,6 +56,10 @@ pub trait Draws {
 impl Draws for Renderer {
     fn device(&self) -> Option<&Gpu> {
         Some(self.gpu())
+    }
+
+    fn took_s(&self) -> f64 {
+        Renderer::took_s(self)
     }
 
     fn draw(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<View, RenderError> {
@@ -88,6 +97,10 @@ impl Draws for Renderer {
 impl Draws for Painter {
     fn device(&self) -> Option<&Gpu> {
         self.renderer().map(Renderer::gpu)
+    }
+
+    fn took_s(&self) -> f64 {
+        self.renderer().map_or(0.0, Renderer::took_s)
     }
 
     fn draw(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<View, RenderError> {
