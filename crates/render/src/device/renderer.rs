@@ -254,7 +254,7 @@ impl Renderer {
         frame.camera.view(width as f32 / height as f32)
     }
 
-    /// Time that the device took for the newest picture known to be finished, s; 0 before the first.
+    /// Time that the device took for the newest finished picture, s; 0 before the first.
     pub fn took_s(&self) -> f64 {
         1e-6 * f64::from(self.took_us.load(Ordering::Relaxed))
     }

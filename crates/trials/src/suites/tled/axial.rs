@@ -61,6 +61,8 @@ struct Scene {
     truth_mm: u32,
     /// Stiffness of the contact, N/mm for each mm².
     stiffness_per_mm2: f32,
+    /// Added mass over a session's share of it.
+    heavier: f32,
 }
 
 impl Scene {
@@ -74,6 +76,7 @@ impl Scene {
             deepest_mm: 8,
             truth_mm: 4,
             stiffness_per_mm2: USUAL,
+            heavier: 1.0,
         };
         vec![
             Self { name: "rod of 2 mm", tool: rod(2.0), ..probe },
@@ -86,6 +89,14 @@ impl Scene {
                 friction: 0.0,
                 oblique_deg: 30.0,
                 deepest_mm: 4,
+                ..probe
+            },
+            Self { name: "probe, as heavy as in a session", heavier: BRAIN_OVER_BLOCK, ..probe },
+            Self {
+                name: "spatula, as heavy as in a session",
+                tool: Tool::spatula(),
+                truth_mm: 6,
+                heavier: BRAIN_OVER_BLOCK,
                 ..probe
             },
             Self { name: "probe, soft contact", stiffness_per_mm2: 0.05, ..probe },
@@ -173,7 +184,7 @@ fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, [f64; 2])> {
     let fixed = boxes::nodes_where(mesh, |p| p.z < 0.5 * VOXEL_MM - BLOCK_MM);
     let body = Body::uniform(mesh.clone(), fixed, Material::WHOLE_BRAIN);
     let config = Config {
-        mass_scaling: MASS_ADDED * BRAIN_OVER_BLOCK,
+        mass_scaling: MASS_ADDED * scene.heavier,
         dynamic_mass_scaling: 16.0,
         averaged_pressure: true,
         damping: Damping::Rate(damping_per_ms()?),
