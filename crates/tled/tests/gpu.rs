@@ -39,6 +39,15 @@ fn loads(body: &Body) -> Loads {
     boxes::nodes_where(&body.mesh, |p| p.x > 59.0 && p.z > 15.0).iter().for_each(|&n| wall.add(n, 1.0));
     wall.normalise();
     loads.contacts.push(wall);
+    // Springs of one node each, as a tool's foundation gives; some lie under the planes, too.
+    for node in boxes::nodes_where(&body.mesh, |p| p.x < 1.0 && p.z > 15.0) {
+        let mut alone = NodalContact::none();
+        (alone.normal, alone.offset_mm, alone.stiffness, alone.damping) = (Vec3::NEG_X, 0.8, 0.05, 0.02);
+        (alone.lateral_velocity, alone.lateral_damping) = (Vec3::new(0.0, 0.01, 0.02), 0.03);
+        alone.add(node, 1.0);
+        alone.normalise();
+        loads.contacts.push(alone);
+    }
     // A wall of planes, under nodes that the springs press too; some only come near.
     for node in boxes::nodes_where(&body.mesh, |p| p.y > 49.0 && p.z > 5.0) {
         let offset_mm = -49.6 - 0.05 * (node % 16) as f32;
