@@ -165,12 +165,12 @@ impl Domain {
                     found.spacing,
                 ),
             };
-            let mut divided = whole.divided(&borders, aim.smoothing * spacing);
-            let has_one = divided.names.len() == 2;
-            let found = if has_one { found } else { search::divide(&mut divided, &aim, &found) };
+            let mut regions = whole.divided(&borders, aim.smoothing * spacing);
+            let has_one = regions.names.len() == 2;
+            let found = if has_one { found } else { search::divide(&mut regions, &aim, &found) };
             nearest = found.labelled.mesh.tets.len();
             if search::meets(nearest, wanted) {
-                return Ok(self.finished(found, if has_one { &whole } else { &divided }, &borders));
+                return Ok(self.finished(found, &regions, &borders));
             }
             aim.target_tets = (aim.target_tets as f64 * wanted as f64 / nearest.max(1) as f64) as usize;
             aim.target_tets = aim.target_tets.max(100);
@@ -269,6 +269,23 @@ mod tests {
             let radius = mesh.positions[node as usize].length();
             assert!((radius - 28.0).abs() < 0.5, "{radius}");
         }
+    }
+
+    #[test]
+    fn labels_that_are_all_too_thin_for_borders_keep_their_shares() {
+        let labels = volume_with([60; 3], millimetres(60), |p| match p.x.abs() < 1.0 {
+            _ if p.length() > 25.0 => 0,
+            true => 2,
+            false => 5,
+        });
+        let LabelledMesh { mesh, label_of_tet, shares } =
+            labelled(&labels, &Config { target_tets: 1_500, ..Config::default() }).unwrap();
+        let most = label_of_tet.iter().filter(|label| **label == 5).count();
+        assert!(most * 10 > 9 * label_of_tet.len(), "{most} of {}", label_of_tet.len());
+        let of_sheet = shares.iter().filter(|share| share.label == 2);
+        let mm3: f64 = of_sheet.map(|share| f64::from(share.share) * mesh.volume_mm3(share.tet as usize)).sum();
+        let voxels = labels.data.iter().filter(|label| **label == 2).count() as f64;
+        assert!((mm3 / voxels - 1.0).abs() < 0.1, "{mm3} mm3 for {voxels}");
     }
 
     /// Volume of each label's tetrahedra, mm³.

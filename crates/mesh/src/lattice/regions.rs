@@ -83,9 +83,12 @@ impl Regions {
     }
 
     /// These regions, smoothed before, divided by their labels, which are smoothed by `sigma_mm`.
-    pub(super) fn divided(&self, labels: &VoxelVolume<u16>, sigma_mm: f64) -> Self {
+    pub(super) fn divided(self, labels: &VoxelVolume<u16>, sigma_mm: f64) -> Self {
         let blocks = Block::of_each(labels);
         let names = std::iter::once(0).chain(blocks.iter().map(|(name, _)| *name)).collect();
+        if blocks.len() == 1 {
+            return Self { names, ..self };
+        }
         let volume = |(_, block): &(u16, Block)| block.voxels as f64 * labels.voxel_mm3();
         let field = |(name, block): &(u16, Block)| {
             let mut field = Field::of(labels, block, sigma_mm, |label| label == *name);
@@ -99,8 +102,8 @@ impl Regions {
             mm3: std::iter::once(0.0).chain(blocks.iter().map(volume)).collect(),
             levels,
             fields: blocks.iter().map(field).collect(),
-            union: Some(self.fields[0].clone()),
-            ..*self
+            union: self.fields.into_iter().next(),
+            ..self
         }
     }
 
