@@ -28,7 +28,7 @@ pub(crate) fn write_voxels<T: Sample>(to: &mut impl Write, data: &[T]) -> io::Re
     let mut bytes = Vec::with_capacity(1 << 16);
     for part in data.chunks(1 << 13) {
         bytes.clear();
-        part.iter().for_each(|v| v.write_le(&mut bytes));
+        T::write_le(part, &mut bytes);
         to.write_all(&bytes)?;
     }
     Ok(())

@@ -6,9 +6,11 @@
 //! with path halving (Tarjan 1975; Rosenfeld and Pfaltz 1966 for the scan).
 //!
 //! # Practice
-//! One pass over the voxels, memory only for the runs: about 10 ms for 10 million voxels.
+//! One pass over the voxels, slices in parallel, memory only for the runs: about 10 ms for 10
+//! million voxels.
 
 use crate::VoxelVolume;
+use rayon::prelude::*;
 
 /// The largest 6-connected piece of nonzero voxels, as a mask of 0 and 1; the first met on a tie.
 pub fn largest_component(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
@@ -35,12 +37,25 @@ struct Run {
 
 impl Components {
     /// Finds the pieces of the voxels for which `set` holds.
-    pub fn of([nx, ny, nz]: [usize; 3], set: impl Fn(usize) -> bool) -> Self {
+    pub fn of(dims: [usize; 3], set: impl Fn(usize) -> bool + Sync) -> Self {
+        Self::of_rows(dims, |_, at| set(at))
+    }
+
+    /// The same by place along x, y and z and by index.
+    pub fn of_rows([nx, ny, nz]: [usize; 3], set: impl Fn([usize; 3], usize) -> bool + Sync) -> Self {
+        let of_row = |row: usize| {
+            let (mut runs, start) = (Vec::new(), row * nx);
+            push_runs(&mut runs, start, nx, &|at| set([at - start, row % ny, row / ny], at));
+            runs
+        };
+        let of_slice = |k: usize| (k * ny..(k + 1) * ny).map(of_row).collect();
+        let slices: Vec<Vec<Vec<Run>>> = (0..nz).into_par_iter().map(of_slice).collect();
         let mut runs: Vec<Run> = Vec::new();
         let mut rows = Vec::with_capacity(ny * nz + 1);
-        for row in 0..ny * nz {
+        for (row, mut of_row) in slices.into_iter().flatten().enumerate() {
             rows.push(runs.len());
-            push_runs(&mut runs, row * nx, nx, &set);
+            of_row.iter_mut().for_each(|run| run.parent += *rows.last().unwrap_or(&0) as u32);
+            runs.append(&mut of_row);
             if row % ny > 0 {
                 join(&mut runs, rows[row - 1], rows[row], rows[row], nx);
             }

@@ -126,6 +126,11 @@ impl DistanceField {
         &self.values
     }
 
+    /// The distances without what finds them at a point.
+    pub fn into_values(self) -> VoxelVolume<f32> {
+        self.values
+    }
+
     /// The distance at a world point, mm: trilinear, clamped to the grid's border outside.
     pub fn sample(&self, world: Vec3) -> f32 {
         self.at(self.voxel_of(world))
@@ -275,6 +280,9 @@ impl Line {
     }
 }
 
+/// Planes across y that are held in memory beside the volume.
+const PLANES: usize = 32;
+
 /// Processes every line along `axis` and stores the results in the volume's order.
 fn along([nx, ny, nz]: [usize; 3], axis: usize, line: impl Fn(Line, &mut Envelope, &mut [f32]) + Sync) -> Vec<f32> {
     let slice = nx * ny;
@@ -290,20 +298,22 @@ fn along([nx, ny, nz]: [usize; 3], axis: usize, line: impl Fn(Line, &mut Envelop
             plane(nx, ny, out, |i, column| line(Line { start: k * slice + i, step: nx, length: ny }, envelope, column));
         }),
         _ => {
-            let planes: Vec<Vec<f32>> = (0..ny)
-                .into_par_iter()
-                .map_init(Envelope::default, |envelope, j| {
-                    let mut out = vec![0.0; nx * nz];
-                    plane(nx, nz, &mut out, |i, column| {
-                        line(Line { start: j * nx + i, step: slice, length: nz }, envelope, column);
-                    });
-                    out
-                })
-                .collect();
-            all.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
-                let k = row / ny;
-                out.copy_from_slice(&planes[row % ny][k * nx..(k + 1) * nx]);
-            });
+            let plane_at = |envelope: &mut Envelope, j: usize| {
+                let mut out = vec![0.0; nx * nz];
+                plane(nx, nz, &mut out, |i, column| {
+                    line(Line { start: j * nx + i, step: slice, length: nz }, envelope, column);
+                });
+                out
+            };
+            for first in (0..ny).step_by(PLANES) {
+                let some = (first..ny.min(first + PLANES)).into_par_iter();
+                let planes: Vec<Vec<f32>> = some.map_init(Envelope::default, plane_at).collect();
+                all.par_chunks_mut(slice).enumerate().for_each(|(k, out)| {
+                    for (row, plane) in out[first * nx..].chunks_mut(nx).zip(&planes) {
+                        row.copy_from_slice(&plane[k * nx..(k + 1) * nx]);
+                    }
+                });
+            }
         }
     }
     all

@@ -24,8 +24,8 @@ impl Piece {
     pub fn all(bone: &BoneVolume) -> Vec<Self> {
         let [nx, ny, nz] = bone.dims();
         let place = |at: usize| [at % nx, at / nx % ny, at / (nx * ny)];
-        let voxel = |at: usize| IVec3::from(place(at).map(|n| n as i32));
-        let components = Components::of([nx, ny, nz], |at| bone.is_bone(voxel(at)));
+        let is_bone = |voxel: [usize; 3], _| bone.is_bone(IVec3::from(voxel.map(|n| n as i32)));
+        let components = Components::of_rows([nx, ny, nz], is_bone);
         let mut pieces = std::collections::BTreeMap::new();
         components.every_run(|piece, run| {
             let none = Self { voxels: 0, low: [usize::MAX; 3], high: [0; 3] };

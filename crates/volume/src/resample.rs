@@ -193,6 +193,12 @@ impl<'a, T: Sample> Source<'a, T> {
     }
 
     fn majority(&self, centre: Vec3, votes: &mut Votes<T>) -> T {
+        if self.parts == UVec3::ONE {
+            let around = self.corners(centre).map(|(at, _)| self.volume.data[at]);
+            if around.iter().all(|label| *label == around[0]) {
+                return around[0];
+            }
+        }
         votes.0.clear();
         let m = self.from_target.matrix3.as_mat3();
         let step = Vec3::ONE / self.parts.as_vec3();

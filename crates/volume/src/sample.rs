@@ -13,8 +13,8 @@ pub trait Sample: Pod + PartialEq + PartialOrd + Send + Sync {
     /// Converts to f32; integers over 2²⁴ are rounded.
     fn to_f32(self) -> f32;
 
-    /// Appends the value's little-endian bytes to `out`.
-    fn write_le(self, out: &mut Vec<u8>);
+    /// Appends the little-endian bytes of values to `out`.
+    fn write_le(values: &[Self], out: &mut Vec<u8>);
 }
 
 macro_rules! sample {
@@ -28,8 +28,13 @@ macro_rules! sample {
             fn to_f32(self) -> f32 {
                 self as f32
             }
-            fn write_le(self, out: &mut Vec<u8>) {
-                out.extend_from_slice(&self.to_le_bytes());
+            fn write_le(values: &[Self], out: &mut Vec<u8>) {
+                const SIZE: usize = size_of::<$type>();
+                let start = out.len();
+                out.resize(start + SIZE * values.len(), 0);
+                for (to, value) in out[start..].chunks_exact_mut(SIZE).zip(values) {
+                    to.copy_from_slice(&value.to_le_bytes());
+                }
             }
         }
     )*};

@@ -77,7 +77,8 @@ impl Field {
         let spacing_mm = labels.spacing_mm();
         let pad = (most_mm / spacing_mm).to_array().map(|sigma| 2 + (3.0 * sigma.max(STEPS)).ceil() as usize);
         let mask = padded(labels, block, pad, inside);
-        let values = DistanceField::of_mask(&mask).values().data.iter().map(|d| -d).collect();
+        let mut values = DistanceField::of_mask(&mask).into_values().data;
+        values.iter_mut().for_each(|d| *d = -*d);
         Self { dims: mask.dims, spacing_mm, values, voxel_from_world: mask.world_from_voxel.inverse() }
     }
 

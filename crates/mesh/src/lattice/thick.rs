@@ -29,6 +29,9 @@ pub(super) struct Thickness {
     to_others: Vec<(u16, Vec<f32>)>,
 }
 
+/// More than what a distance is rounded by, mm.
+const SPARE_MM: f32 = 0.1;
+
 /// Where balls have one radius: from one distance to another from the finer region, mm.
 struct Scale {
     from_mm: f64,
@@ -45,7 +48,7 @@ impl Thickness {
         let here = cropped(labels, whole.low, whole.high);
         let distance = |(label, _): &(u16, Block)| {
             let others = here.map(|found| u8::from(found != 0 && found != *label));
-            (*label, DistanceField::of_mask(&others).values().data.clone())
+            (*label, DistanceField::of_mask(&others).into_values().data)
         };
         let to_others = blocks.iter().filter(|(label, _)| *label != host).map(distance).collect();
         Self { host, low: whole.low, here, to_others }
@@ -97,7 +100,7 @@ impl Thickness {
         };
         let mut centres = part.map(|_| 0u8);
         centres.data.iter_mut().enumerate().for_each(|(at, is)| *is = u8::from(is_centre(&in_whole(at))));
-        let core = DistanceField::of_mask(&centres);
+        let core = DistanceField::of_mask_within(&centres, reach_mm as f32 + SPARE_MM);
         for at in (0..part.data.len()).filter(|at| part.data[*at] == label) {
             let place = voxel(part.dims, at);
             let away = away(part.centre_of(place));

@@ -38,6 +38,7 @@ pub use cut::{CUT_STEPS, CUT_SURFACE, CutWriter, cut_depth};
 use crate::VoxelVolume;
 use crate::stroke::{BRICK, Strokes};
 use glam::{DVec3, IVec3};
+use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicU64, Ordering};
 use trepan_geometry::{Aabb, Vec3};
 
@@ -99,7 +100,7 @@ impl BoneVolume {
             spacing_mm: spacing as f32,
             isovalue,
             bounds: Aabb::EMPTY,
-            hu: volume.data.iter().map(|&v| AtomicI16::new(v)).collect(),
+            hu: volume.data.par_iter().map(|&v| AtomicI16::new(v)).collect(),
             cut: cut::CutField::new(volume.dims, spacing as f32, 0),
             bricks,
             versions: counters(),
@@ -117,16 +118,21 @@ impl BoneVolume {
 
     /// Bounding box of the bone; marks the bricks that contain some.
     fn find_bone(&self) -> Option<Aabb> {
-        let voxels = self.hu.iter().enumerate().filter(|(_, v)| v.load(Ordering::Relaxed) >= self.isovalue);
-        let [nx, ny, _] = self.dims;
-        let (mut low, mut high) = (IVec3::MAX, IVec3::MIN);
-        for (at, _) in voxels {
-            let voxel = IVec3::new((at % nx) as i32, (at / nx % ny) as i32, (at / (nx * ny)) as i32);
-            (low, high) = (low.min(voxel), high.max(voxel));
-            self.solid[self.brick_of(voxel)].store(true, Ordering::Relaxed);
-        }
+        let [nx, ny, nz] = self.dims;
+        let is_bone = |v: &AtomicI16| v.load(Ordering::Relaxed) >= self.isovalue;
+        let ends = |row: usize| {
+            let voxels = &self.hu[row * nx..][..nx];
+            let at = |x: usize| IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32);
+            let low = at(voxels.iter().position(is_bone)?);
+            for (brick, _) in voxels.chunks(BRICK).enumerate().filter(|(_, part)| part.iter().any(is_bone)) {
+                self.solid[self.brick_of(at(brick * BRICK))].store(true, Ordering::Relaxed);
+            }
+            Some((low, at(voxels.iter().rposition(is_bone)?)))
+        };
+        let rows = (0..ny * nz).into_par_iter().filter_map(ends);
+        let (low, high) = rows.reduce_with(|(a, b), (c, d)| (a.min(c), b.max(d)))?;
         let half = Vec3::splat(0.5 * self.spacing_mm);
-        (low.x <= high.x).then(|| Aabb { min: self.centre_of(low) - half, max: self.centre_of(high) + half })
+        Some(Aabb { min: self.centre_of(low) - half, max: self.centre_of(high) + half })
     }
 
     /// Number of this volume, unique in the process. Readers that keep state recognise it by this.
@@ -238,6 +244,18 @@ impl BoneVolume {
     #[inline]
     pub fn ct(&self, voxel: IVec3) -> i16 {
         self.index(voxel).map_or(AIR_HU, |at| self.hu[at].load(Ordering::Relaxed))
+    }
+
+    /// Reads the CT's densities of a row of voxels along x from `start`, HU; [`AIR_HU`] beyond the
+    /// grid.
+    pub fn read_ct(&self, start: IVec3, out: &mut [i16]) {
+        out.fill(AIR_HU);
+        let skipped = (-start.x).max(0);
+        let Some(first) = self.index(start + skipped * IVec3::X) else { return };
+        let room = self.dims[0] - (start.x + skipped) as usize;
+        let from = self.hu[first..first + room].iter();
+        let to = out.iter_mut().skip(skipped as usize);
+        to.zip(from).for_each(|(to, from)| *to = from.load(Ordering::Relaxed));
     }
 
     /// Whether a voxel is bone.
@@ -390,7 +408,7 @@ impl BoneVolume {
     pub fn snapshot(&self) -> VoxelVolume<i16> {
         let mut volume = VoxelVolume::isotropic(self.dims, self.origin, self.spacing_mm, AIR_HU);
         let [nx, ny, _] = self.dims;
-        for (row, to) in volume.data.chunks_exact_mut(nx).enumerate() {
+        volume.data.par_chunks_exact_mut(nx).enumerate().for_each(|(row, to)| {
             let start = IVec3::new(0, (row % ny) as i32, (row / ny) as i32);
             let from = &self.hu[row * nx..][..nx];
             if self.is_cut_near(self.cut.nodes * start, self.cut.nodes * start.with_x(nx as i32 - 1)) {
@@ -398,7 +416,7 @@ impl BoneVolume {
             } else {
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = from.load(Ordering::Relaxed));
             }
-        }
+        });
         volume
     }
 }

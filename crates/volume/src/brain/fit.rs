@@ -2,7 +2,7 @@
 
 use super::cavity::cavity;
 use super::given::{Given, stripped};
-use super::morphology::{closed, core, within};
+use super::morphology::{SPARE_MM, closed, core, within};
 use super::{BrainConfig, in_head, millilitres};
 use crate::padding::Padding;
 use crate::{DistanceField, Grid, Interpolation, TooLarge, VoxelVolume, resample, room_for_voxels};
@@ -89,7 +89,7 @@ pub fn brain_fit(
     let hidden = core(&hidden, GAP_MM).map(|core| within(&core, GAP_MM + 1.0, |at| hidden.data[at] != 0));
     // 2 outside the MRI.
     let on_ct = resample(brain, &grid, Interpolation::Nearest, 2);
-    let to_room = DistanceField::of_mask(&room);
+    let to_room = DistanceField::of_mask_within(&room, SLACK_MM + SPARE_MM);
     let (mut inside, mut outside, mut space, mut space_hidden) = (0, 0, 0, 0);
     let mut middles = [Middle::default(), Middle::default()];
     for at in 0..on_ct.data.len() {
@@ -184,7 +184,9 @@ pub fn stray_bone(brain: &VoxelVolume<u8>, ct: &VoxelVolume<i16>, isovalue: i16)
     let grid = Grid::isotropic_over(brain, WORK_MM);
     room_for_voxels(grid.voxels() as u64, 32)?;
     let whole = closed(&resample(brain, &grid, Interpolation::Nearest, 0), CLOSING_MM);
-    let field = DistanceField::of_mask(&whole);
+    // A sample lies between voxels that differ by no more than their diagonal.
+    let diagonal_mm = 2.0 * WORK_MM;
+    let field = DistanceField::of_mask_within(&whole, FRAME_MM.max(STRAY_MM) + diagonal_mm);
     let heights = (0..whole.data.len()).filter(|&at| whole.data[at] != 0).map(|at| grid.place(at).z);
     let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
     let of_ct = Grid::of(ct);

@@ -34,7 +34,8 @@ impl Given {
         let mut coarse = resample(mri, grid, Interpolation::Trilinear, zero);
         coarse.data.iter_mut().for_each(|v| *v -= zero);
         let on_grid = |mask: VoxelVolume<u8>| {
-            let field = resample(DistanceField::of_mask(&mask).values(), grid, Interpolation::Trilinear, FAR_MM);
+            let field = DistanceField::of_mask_within(&mask, 2.0 * mask.spacing_mm().length() as f32);
+            let field = resample(field.values(), grid, Interpolation::Trilinear, FAR_MM);
             field.map(|d| u8::from(d < 0.0))
         };
         let stripped = stripped.map(on_grid);

@@ -6,7 +6,7 @@
 //! to 1.3 w (under fat and contrast agent). The head is everything over half of Otsu's threshold
 //! (1979), closed and filled.
 
-use super::morphology::{closed, filled};
+use super::morphology::{SPARE_MM, closed, filled};
 use crate::{DistanceField, VoxelVolume, largest_component};
 
 /// Depth under the skin from which there is only brain and CSF, mm.
@@ -38,7 +38,7 @@ impl Levels {
 
     /// Computes it from the voxels over 10 mm inside a mask on the MRI's grid.
     pub fn within(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>) -> Option<Self> {
-        let to_wall = DistanceField::of_mask(mask);
+        let to_wall = DistanceField::of_mask_within(mask, DEEP_MM + SPARE_MM);
         Self::of(mri, |at| to_wall.values().data[at] < -DEEP_MM)
     }
 
@@ -47,13 +47,13 @@ impl Levels {
     }
 }
 
-/// Depth of each voxel under the skin, mm; negative outside the head.
+/// Depth of each voxel under the skin, mm, exact up to the core; negative outside the head.
 pub(super) fn depth_in_head(mri: &VoxelVolume<f32>) -> VoxelVolume<f32> {
     let mut values: Vec<f32> = mri.data.iter().copied().filter(|&v| v > 0.0).collect();
     values.sort_unstable_by(f32::total_cmp);
     let level = 0.5 * otsu(&values);
     let head = filled(&closed(&largest_component(&mri.map(|v| u8::from(v > level))), 6.0));
-    DistanceField::of_mask(&head).values().map(|d| -d)
+    DistanceField::of_mask_within(&head, CORE_MM + SPARE_MM).values().map(|d| -d)
 }
 
 /// Whether a depth belongs to the middle of the head.

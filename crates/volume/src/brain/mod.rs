@@ -50,7 +50,7 @@ pub use confidence::BrainConfidence;
 use given::Given;
 use glam::{DAffine3, DVec3};
 use levels::{Levels, depth_in_head, is_core};
-use morphology::{closed, core, within};
+use morphology::{SPARE_MM, closed, core, within};
 
 /// Depth under the skin within which there is no brain, mm.
 const SHALLOW_MM: f32 = 6.0;
@@ -261,7 +261,7 @@ fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig)
     let tissue = |at: usize| room.data[at] != 0 && levels.hold(mri.data[at]);
     let mut brain = closed(&opened(mri, tissue, config.opening_mm)?, config.closing_mm);
     brain.data.iter_mut().zip(&room.data).for_each(|(brain, room)| *brain &= room);
-    let distance = DistanceField::of_mask(&brain);
+    let distance = DistanceField::of_mask_within(&brain, config.border_mm + SPARE_MM);
     let mask = grown(mri, &distance.values().data, levels.greatest, config.border_mm, |at| room.data[at] == 0);
     Some((mask, levels))
 }
@@ -280,7 +280,8 @@ fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<(VoxelVolume<
         if shallow as f64 > LEAK * inside as f64 {
             continue;
         }
-        let distance = DistanceField::of_mask(&closed(&brain, config.closing_mm));
+        let closed = closed(&brain, config.closing_mm);
+        let distance = DistanceField::of_mask_within(&closed, config.border_mm.max(RIM_MM) + SPARE_MM);
         let distance = &distance.values().data;
         let with_rim = distance.iter().filter(|&&d| d < RIM_MM).count();
         if with_rim as f64 * mri.voxel_mm3() * 1e-3 <= config.greatest_ml {
@@ -304,7 +305,7 @@ fn opened(mri: &VoxelVolume<f32>, tissue: impl Fn(usize) -> bool, radius_mm: f32
 
 /// The mask on the MRI's grid, with an interpolated surface and without bone; the largest piece.
 fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&VoxelVolume<i16>, i16)>) -> VoxelVolume<u8> {
-    let field = DistanceField::of_mask(brain);
+    let field = DistanceField::of_mask_within(brain, 2.0 * brain.spacing_mm().length() as f32);
     let fine = resample(field.values(), &Grid::of(mri), Interpolation::Trilinear, FAR_MM);
     let mut mask = fine.map(|d| u8::from(d < 0.0));
     if let Some(((ct, isovalue), [low, high])) = bone.zip(extent(&mask)) {

@@ -10,7 +10,7 @@ use crate::component::Components;
 use crate::{DistanceField, Grid, VoxelVolume, largest_component};
 
 /// More than what a distance is rounded by, mm.
-const SPARE_MM: f32 = 0.1;
+pub(super) const SPARE_MM: f32 = 0.1;
 
 fn eroded(mask: &VoxelVolume<u8>, radius_mm: f32) -> VoxelVolume<u8> {
     DistanceField::of_mask_within(mask, radius_mm + SPARE_MM).values().map(|d| u8::from(d < -radius_mm))
