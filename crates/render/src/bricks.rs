@@ -15,6 +15,7 @@
 
 use crate::drilled::{Drilled, LEAP};
 use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
 
@@ -121,11 +122,16 @@ impl Grid {
     pub fn shares(&self, bone: Option<&BoneVolume>) -> Vec<u8> {
         let [bx, by, bz] = self.blocks();
         let Some(bone) = bone else { return vec![0; bx * by * bz] };
-        (0..bx * by * bz).map(|at| self.share(bone, [at % bx, at / bx % by, at / (bx * by)])).collect()
+        let place = |at: usize| [at % bx, at / bx % by, at / (bx * by)];
+        (0..bx * by * bz).into_par_iter().map(|at| self.share(bone, place(at))).collect()
     }
 
     /// Bone fraction of a block, 0 to 255.
     pub fn share(&self, bone: &BoneVolume, block: [usize; 3]) -> u8 {
+        let low = IVec3::from(block.map(|b| (b * BLOCK) as i32)) - 1;
+        if !bone.may_hold_bone(low, low + (BLOCK as i32 - 1)) {
+            return 0;
+        }
         let count = corners(block.map(|b| b * BLOCK), BLOCK).filter(|&v| bone.is_bone(v - 1)).count();
         (count * 255 / BLOCK.pow(3)) as u8
     }
@@ -154,8 +160,8 @@ impl Leaps {
         if let Some(bone) = bone {
             for at in 0..count {
                 leaps.drilled.follow(bone, at, leaps.place(at));
-                leaps.cells[at] = leaps.promising(bone, at);
             }
+            leaps.cells = (0..count).into_par_iter().map(|at| leaps.promising(bone, at)).collect();
         }
         leaps.settle();
         leaps
@@ -207,6 +213,10 @@ impl Leaps {
     /// cut, x fastest.
     fn promising(&self, bone: &BoneVolume, at: usize) -> u64 {
         const EDGE: usize = LEAP + 1;
+        let low = IVec3::from(self.place(at).map(|b| (b * LEAP) as i32)) - 1;
+        if !bone.may_hold_bone(low, low + LEAP as i32) {
+            return 0;
+        }
         let mut corner = [false; EDGE * EDGE * EDGE];
         for (is_bone, padded) in corner.iter_mut().zip(corners(self.place(at).map(|b| b * LEAP), EDGE)) {
             *is_bone = bone.ct(padded - 1) >= bone.isovalue();

@@ -15,12 +15,12 @@ pub(crate) struct Kept {
     /// Box that the slices show.
     pub bounds: Aabb,
     pub brain: Option<Border>,
-    pub mri: Option<Signals>,
+    pub mri: Option<Arc<Signals>>,
 }
 
 impl Kept {
     pub fn of(data: &SceneData) -> Result<Self, RenderError> {
-        let mri = data.mri.map(|mri| Signals::of(mri, data.tint)).transpose()?;
+        let mri = data.mri.map(|mri| Signals::of(mri, data.tint)).transpose()?.map(Arc::new);
         Ok(Self { bone: data.bone.clone(), bounds: bounds(data), brain: data.brain.map(Border::of), mri })
     }
 }

@@ -96,7 +96,7 @@ impl Smooth {
         let mut read = vec![0i16; wide];
         for k in 0..high {
             for (j, row) in rows.chunks_exact_mut(nx).enumerate() {
-                read_ct(bone, low + IVec3::new(0, j as i32, k as i32), &mut read);
+                bone.read_ct(low + IVec3::new(0, j as i32, k as i32), &mut read);
                 for (to, hu) in line.iter_mut().zip(&read) {
                     *to = f32::from(*hu).clamp(isovalue - CLAMP_HU, isovalue + CLAMP_HU);
                 }
@@ -160,11 +160,6 @@ impl Smooth {
 fn bricks(bone: &BoneVolume) -> impl Iterator<Item = IVec3> {
     let [bx, by, bz] = bone.bricks().map(|n| n as i32);
     (0..bx * by * bz).map(move |at| IVec3::new(at % bx, at / bx % by, at / (bx * by)))
-}
-
-/// The CT along x from `start`; beyond the grid, air.
-fn read_ct(bone: &BoneVolume, start: IVec3, out: &mut [i16]) {
-    out.iter_mut().zip(0..).for_each(|(out, i)| *out = bone.ct(start + i * IVec3::X));
 }
 
 fn add(to: &mut [f32], weight: f32, from: &[f32]) {

@@ -53,6 +53,7 @@ use bricks::Bricks;
 use eye::Eye;
 use glam::Vec3;
 use skull::Ray;
+use std::sync::Arc;
 use trepan_geometry::Aabb;
 
 /// Renders pictures of one scene on the processor.
@@ -60,7 +61,7 @@ use trepan_geometry::Aabb;
 pub struct ProcessorRenderer {
     bricks: Bricks,
     brain: Option<Border>,
-    mri: Option<Signals>,
+    mri: Option<Arc<Signals>>,
     bounds: Aabb,
     layout: Layout,
     picture: Image,
@@ -214,7 +215,7 @@ impl ProcessorRenderer {
 
     fn inputs<'a>(&'a self, frame: &Frame<'a>, scene: &'a Scene) -> Inputs<'a> {
         let (bone_paint, brain_paint) = (frame.bone_paint, frame.brain_paint);
-        Inputs { scene, bricks: &self.bricks, mri: self.mri.as_ref(), bone_paint, brain_paint }
+        Inputs { scene, bricks: &self.bricks, mri: self.mri.as_deref(), bone_paint, brain_paint }
     }
 
     fn slices(&mut self, frame: &Frame, scene: &Scene) {
@@ -222,7 +223,7 @@ impl ProcessorRenderer {
         let through = frame.focus(self.bounds);
         let look = frame.slices.with_bone(self.bricks.is_some());
         let planes = Plane::three(through, self.bounds, frame.slices.half_height_mm, &rectangles);
-        let (bricks, mri, width) = (&self.bricks, self.mri.as_ref(), self.picture.width as usize);
+        let (bricks, mri, width) = (&self.bricks, self.mri.as_deref(), self.picture.width as usize);
         let inputs = Inputs { scene, bricks, mri, bone_paint: None, brain_paint: None };
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut self.picture.rgba);
         let first = self.turn;
