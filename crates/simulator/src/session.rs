@@ -170,7 +170,7 @@ impl Session {
     /// Runs the session and writes its files; on failure no partly written file remains.
     pub fn run(mut self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let (before, whole) = (self.setup.pieces(), self.setup.bone().map(|bone| bone.snapshot()));
+        let (before, whole) = (self.setup.pieces(), self.whole());
         let (options, plan, rate_hz) = (&self.options, &self.setup.plan, self.setup.operation.rate_hz);
         let hand = OpenDevice::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
         let second = match &self.second {
@@ -193,7 +193,7 @@ impl Session {
         let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
         let recorder = Recorder::create(&record, &header)?;
         let scene = match self.recording {
-            None => Some((self.film(None), SceneWriter::create(&output::scene_of(&record), &header)?)),
+            None => Some((self.film(whole.clone(), None), SceneWriter::create(&output::scene_of(&record), &header)?)),
             Some(_) => None,
         };
         self.place.progress.next("preparing the picture")?;
@@ -209,7 +209,7 @@ impl Session {
         let ended = watching.and_then(|watching| watching.ended());
         ended.iter().for_each(|text| tracing::info!("{text}"));
         let recording = Recording::open(&record)?;
-        self.map(&mut album, whole.as_ref(), &recording);
+        self.map(&mut album, whole.as_deref(), &recording);
         let mut remarks = self.setup.scene.remarks.clone();
         remarks.extend(self.setup.models.unmet.iter().cloned());
         let (lack, unlike) = self.replay_remarks();
@@ -219,9 +219,9 @@ impl Session {
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         let drilled =
-            self.setup.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
+            self.setup.bone().zip(whole.as_deref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let around = self.setup.bone().zip(whole.as_ref()).filter(|_| self.options.drilled_fine);
+        let around = self.setup.bone().zip(whole.as_deref()).filter(|_| self.options.drilled_fine);
         let around = around.and_then(|(bone, whole)| drilled::on_nodes_around(whole, bone));
         let bone_before = self.setup.bone().zip(whole);
         let summary = Summary {
@@ -358,7 +358,7 @@ impl Session {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
-                let film = self.windowed().then(|| self.film(Some(length_ms)));
+                let film = self.windowed().then(|| self.film(self.whole(), Some(length_ms)));
                 lockstep::run(run, (recording, end_ms), film, picture)
             }
             (None, Some(devices)) => threads::run(run, devices, self.pace(), picture),
@@ -366,10 +366,15 @@ impl Session {
         }
     }
 
-    /// The film of the session's skull and brain.
-    fn film(&self, length_ms: Option<f64>) -> Filming {
+    /// The skull's densities before anything is drilled.
+    fn whole(&self) -> Option<Arc<VoxelVolume<i16>>> {
+        self.setup.bone().map(|bone| Arc::new(bone.snapshot()))
+    }
+
+    /// The film of the session's brain and of its skull, which nobody has drilled yet.
+    fn film(&self, whole: Option<Arc<VoxelVolume<i16>>>, length_ms: Option<f64>) -> Filming {
         let rest = self.setup.scene.brain.as_ref().map(|brain| brain.mesh.positions.clone()).unwrap_or_default();
-        Filming::new(self.setup.bone().cloned(), rest, length_ms)
+        Filming::new(self.setup.bone().cloned().zip(whole), rest, length_ms)
     }
 
     /// Limits of a hand's device; the recorded ones, if none is open.

@@ -186,9 +186,20 @@ impl TissueSource {
         regions.into_iter().map(of).chain([ventricles]).collect()
     }
 
-    /// Reads the label volume; returns a mask of the class and remarks.
-    pub fn read(&self, notes: &mut Vec<String>) -> Result<VoxelVolume<u8>, SessionError> {
-        let read = Segmentation::read(&self.path)?;
+    /// Reads the label volumes of sources, each file once; returns a mask of each and remarks.
+    pub fn read_all(sources: &[Self], notes: &mut Vec<String>) -> Result<Vec<VoxelVolume<u8>>, SessionError> {
+        let mut masks = Vec::new();
+        for of_file in sources.chunk_by(|a, b| a.path == b.path) {
+            let read = Segmentation::read(&of_file[0].path)?;
+            for source in of_file {
+                masks.push(source.mask(&read, notes)?);
+            }
+        }
+        Ok(masks)
+    }
+
+    /// Mask of the class in its label volume, and remarks.
+    fn mask(&self, read: &Segmentation, notes: &mut Vec<String>) -> Result<VoxelVolume<u8>, SessionError> {
         let names = || read.segments.iter().map(|segment| segment.name.as_str()).collect::<Vec<_>>().join(", ");
         let case = |fault: String| SessionError::Case(format!("--tissue {}: {fault}", self.class.name()));
         let mut chosen = Vec::new();

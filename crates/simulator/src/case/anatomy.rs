@@ -278,14 +278,16 @@ pub(super) fn make_classes(
 
 /// Builds the brain: the MRI on the grid of the classes, and tetrahedra, refined at the opening.
 pub(super) fn make_brain(
-    mri: &VoxelVolume<f32>,
+    whole: VoxelVolume<f32>,
     classes: VoxelVolume<u8>,
     fine: Option<Fine>,
     recipe: &Recipe,
 ) -> Result<Brain, SessionError> {
     room_for("tetrahedra", recipe.tets as u64, TET_BYTES)
         .map_err(|fault| SessionError::Usage(format!("--tets {}: {fault}; give fewer", recipe.tets)))?;
-    let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
+    let mri = resample(&whole, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
+    // The mesher takes the most memory of an import.
+    drop(whole);
     let config = lattice::Config::with_opening(recipe.tets, fine);
     let labelled = lattice::labelled(&classes.map(u16::from), &config)
         .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;

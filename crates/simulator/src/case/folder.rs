@@ -22,6 +22,7 @@ use crate::mixture::Shares;
 use crate::progress::DraftSkull;
 use crate::recipe::Recipe;
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -63,23 +64,24 @@ struct Card {
 /// Writes a case into an empty folder.
 pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut names = Vec::new();
-    if let Some(skull) = &case.skull {
-        nifti::write(&folder.join(SKULL), skull)?;
-        names.push(SKULL);
-    }
-    if let Some(brain) = &case.brain {
-        nifti::write(&folder.join(MASK), &brain.classes)?;
-        nifti::write(&folder.join(MRI), &brain.mri)?;
-        let label_of_tet = brain.class_of_tet.iter().map(|&class| class.into()).collect();
-        let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet, ..LabelledMesh::default() };
-        vtk::write_labelled(&folder.join(MESH), &labelled)?;
-        names.extend([MASK, MRI, MESH]);
-    }
+    let write_skull = || match &case.skull {
+        Some(skull) => nifti::write(&folder.join(SKULL), skull),
+        None => Ok(()),
+    };
+    let write_brain = || match &case.brain {
+        Some(brain) => write_brain(brain, folder),
+        None => Ok(()),
+    };
+    let (skull, brain) = rayon::join(write_skull, write_brain);
+    skull?;
+    brain.map_err(|fault| -> Box<dyn Error> { fault })?;
+    names.extend(case.skull.iter().map(|_| SKULL));
+    names.extend(case.brain.iter().flat_map(|_| [MASK, MRI, MESH]));
     if let Some(png) = &case.fit_png {
         fs::write(folder.join(FIT), png)?;
         names.push(FIT);
     }
-    let hashed = |name: &str| Ok((name.to_string(), digest(&folder.join(name))?));
+    let hashed = |name: &&str| Ok(((*name).to_string(), digest(&folder.join(name))?));
     let card = Card {
         form: FORM,
         name: case.name.clone(),
@@ -91,9 +93,18 @@ pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
         recipe: case.recipe,
         mixtures: case.brain.as_ref().map(|brain| brain.mixtures.clone()).unwrap_or_default(),
         notes: case.notes.clone(),
-        files: names.into_iter().map(hashed).collect::<io::Result<_>>()?,
+        files: names.par_iter().map(hashed).collect::<io::Result<_>>()?,
     };
     Ok(fs::write(folder.join(CARD), serde_json::to_vec_pretty(&card)?)?)
+}
+
+/// Writes the brain's files.
+fn write_brain(brain: &Brain, folder: &Path) -> Result<(), Box<dyn Error + Send + Sync>> {
+    nifti::write(&folder.join(MASK), &brain.classes)?;
+    nifti::write(&folder.join(MRI), &brain.mri)?;
+    let label_of_tet = brain.class_of_tet.iter().map(|&class| class.into()).collect();
+    let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet, ..LabelledMesh::default() };
+    Ok(vtk::write_labelled(&folder.join(MESH), &labelled)?)
 }
 
 /// Reads the patient's identity from a case folder, without the volumes.

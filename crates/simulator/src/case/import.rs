@@ -30,6 +30,7 @@ use crate::program::Program;
 use crate::progress::Progress;
 use crate::recipe::Recipe;
 use crate::remark::WELL;
+use crate::tissue_class::TissueSource;
 use glam::DAffine3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -285,19 +286,29 @@ struct Images {
 }
 
 fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<Images, SessionError> {
-    let mut notes = Vec::new();
+    let [mut notes, mut of_ct, mut of_mri] = [const { Vec::new() }; 3];
     stages.next("reading the CT")?;
-    // Labels first: they take a second, and what is wrong with them is said before the rest begins.
-    let labels = inputs.labels.as_deref().map(read_labels).transpose()?;
-    let tissues = inputs.tissues.iter().map(|source| source.read(&mut notes)).collect::<Result<_, _>>()?;
-    let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut notes)).transpose()?;
+    let labels = || {
+        let labels = inputs.labels.as_deref().map(read_labels).transpose()?;
+        Ok::<_, SessionError>((labels, TissueSource::read_all(&inputs.tissues, &mut notes)?))
+    };
+    // CT and MRI in turn: memory that reading the one took serves the other.
+    let images = || {
+        let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut of_ct)).transpose();
+        (ct, inputs.mri.as_deref().map(|path| read_mri(path, recipe.mri_series, &mut of_mri)).transpose())
+    };
+    let (labels, (ct, mri)) = rayon::join(labels, images);
+    // What is wrong with labels is said before segmentation begins.
+    let ((labels, tissues), ct) = (labels?, ct?);
+    notes.append(&mut of_ct);
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
     if let Some(ct) = ct.as_ref().filter(|_| recipe.isovalue_hu.is_none()) {
         notes.extend(scale_doubt(ct, isovalue_hu, inputs.mri.is_some())?);
     }
     stages.offer_skull(ct.as_ref().map(|ct| || case_folder::in_draft(ct, isovalue_hu)));
     stages.next("reading the MRI")?;
-    let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, recipe.mri_series, &mut notes)).transpose()?;
+    let mut mri = mri?;
+    notes.append(&mut of_mri);
     let (mut fit, mut ct_from_mri) = (Fit::new(), DAffine3::IDENTITY);
     if let (Some(ct), Some(mri)) = (&ct, &mut mri) {
         if recipe.register {
@@ -310,24 +321,31 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     }
     stages.next("segmenting the brain")?;
     let space = ct.as_ref().map(|ct| Space { ct, isovalue_hu, registered: recipe.register });
-    let mut is_checked = true;
-    if let Some((space, mri)) = space.as_ref().zip(mri.as_ref()) {
-        is_checked = space.check_mri(mri, &mut notes)?;
-    }
     let given = inputs.labels.as_deref().zip(labels);
     let found_in = if given.is_some() { "the labels" } else { "the brain found in the skull" };
-    is_checked &= given.is_none();
-    let mask = mri
-        .as_ref()
-        .map(|mri| find_brain(given, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut notes))
-        .transpose()?;
-    if let (Some(space), Some(mri), Some(mask)) = (space, &mri, &mask) {
-        if !is_checked {
-            space.check(found_in, mask, mri, &mut notes)?;
-        }
-        notes.extend(space.stray(mask)?);
-    }
-    if mask.as_ref().is_some_and(leans) {
+    let is_given = given.is_some();
+    let mut of_brain = Vec::new();
+    let check = || match space.as_ref().zip(mri.as_ref()) {
+        Some((space, mri)) => space.check_mri(mri, &mut notes),
+        None => Ok(true),
+    };
+    let find = || {
+        let find = |mri| find_brain(given, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut of_brain);
+        mri.as_ref().map(find).transpose()
+    };
+    let (is_checked, mask) = rayon::join(check, find);
+    let is_checked = is_checked? && !is_given;
+    let mask = mask?;
+    notes.append(&mut of_brain);
+    let check = || match (&space, &mri, &mask) {
+        (Some(space), Some(mri), Some(mask)) if !is_checked => space.check(found_in, mask, mri, &mut notes),
+        _ => Ok(()),
+    };
+    let stray = || space.as_ref().zip(mask.as_ref()).map_or_else(|| Ok(Vec::new()), |(space, mask)| space.stray(mask));
+    let (checked, (stray, leans)) = rayon::join(check, || rayon::join(stray, || mask.as_ref().is_some_and(leans)));
+    checked?;
+    notes.extend(stray?);
+    if leans {
         notes.push("the head may not lie as its image says: its brain is not longest from back to front, or not alike left and right; check the planes in the slices".into());
     }
     Ok(Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
@@ -358,11 +376,16 @@ fn build(
 ) -> Result<Case, SessionError> {
     let Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull")?;
-    let made = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
+    let mut of_classes = Vec::new();
+    let make_skull = || ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose();
+    let make_classes =
+        || mask.map(|mask| make_classes((inputs, tissues), &mask, ct_from_mri, &mut of_classes)).transpose();
+    let (made, classes) = rayon::join(make_skull, make_classes);
+    let (made, classes) = (made?, classes?);
     notes.extend(made.as_ref().and_then(|(_, islands)| loose(islands)));
+    notes.append(&mut of_classes);
     let skull = made.map(|(skull, _)| skull);
     stages.next("planning the opening")?;
-    let classes = mask.map(|mask| make_classes((inputs, tissues), &mask, ct_from_mri, &mut notes)).transpose()?;
     let on_skull = |(ct, skull)| match known {
         Some(opening) => opening.on(&bone_of(skull, isovalue_hu)?, classes.is_some()),
         None => Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe),
@@ -372,12 +395,13 @@ fn build(
         Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
         found => found?,
     };
+    drop(ct);
     stages.next("meshing the brain")?;
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
     let fineness = Fineness::stepped(recipe.tets, recipe.halvings);
     let at = |opening: Opening| fineness.fine(opening.brain(), -Vec3::from(opening.inward));
     let fine = opening.or_else(bare).and_then(at);
-    let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, fine, recipe)).transpose()?;
+    let brain = mri.zip(classes).map(|(mri, classes)| make_brain(mri, classes, fine, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }
 

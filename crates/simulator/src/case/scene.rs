@@ -1,6 +1,6 @@
 //! Prepares a case for contact, drilling and deformation.
 
-use crate::case::opening::bare_brain;
+use crate::case::opening::{bare_brain, bone_of};
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
 use crate::mixture::{self, Shares};
@@ -63,14 +63,12 @@ impl Scene {
     /// Prepares a case for a program.
     pub fn new(program: Program, case: Case) -> Result<Self, SessionError> {
         let mut remarks = case.notes;
-        let bone = match &case.skull {
-            Some(skull) => {
-                let bone = BoneVolume::new(skull, case.isovalue_hu);
-                Some(Arc::new(bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?))
-            }
-            None => None,
-        };
-        let brain = case.brain.map(|brain| rest_brain(brain, bone.as_deref(), &mut remarks));
+        let bone = || case.skull.as_ref().map(|skull| bone_of(skull, case.isovalue_hu)).transpose();
+        let field = || case.brain.as_ref().map(|brain| DistanceField::of_mask(&brain.classes));
+        let (bone, field) = rayon::join(bone, field);
+        let bone = bone?.map(Arc::new);
+        let brain = case.brain.zip(field);
+        let brain = brain.map(|(brain, field)| rest_brain(brain, field, bone.as_deref(), &mut remarks));
         if brain.is_none() {
             remarks.push("without an MRI there is no warning before the burr reaches the brain".into());
         }
@@ -119,11 +117,11 @@ impl RestBrain {
             let at = mask.index((voxel - first).as_usizevec3().to_array());
             mask.data[at] = 1;
         }
-        Some(DistanceField::of_mask(&mask))
+        Some(DistanceField::of_mask_within(&mask, ROOM_MM))
     }
 }
 
-fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>) -> RestBrain {
+fn rest_brain(brain: Brain, field: DistanceField, bone: Option<&BoneVolume>, remarks: &mut Vec<String>) -> RestBrain {
     let mut fixed = bone.map(|bone| fixed_by_bone(&brain.mesh, bone)).unwrap_or_default();
     if fixed.len() < MIN_FIXED {
         remarks.push(
@@ -136,7 +134,7 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
     let tint_of = |&code: &u8| marked.get(usize::from(code).wrapping_sub(1)).copied().unwrap_or([0; 3]);
     let tint: Vec<[u8; 3]> = brain.classes.data.iter().map(tint_of).collect();
     let tint = Some(tint).filter(|tint| tint.iter().any(|&colour| colour != [0; 3]));
-    let field = Arc::new(DistanceField::of_mask(&brain.classes));
+    let field = Arc::new(field);
     let Brain { classes, mri, mesh, class_of_tet, mixtures } = brain;
     RestBrain { fixed, field, mesh, class_of_tet, mixtures, classes, mri, tint }
 }

@@ -19,6 +19,7 @@
 
 use crate::report::summary::RemovedLabel;
 use glam::{DVec3, IVec3, USizeVec3};
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use trepan_geometry::Vec3;
@@ -138,21 +139,31 @@ fn is_cut(bone: &BoneVolume, point: Vec3) -> bool {
 /// Returns the world corners of a box around the removed bone, mm; `None` if nothing was removed.
 fn gone_box(before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<(DVec3, DVec3)> {
     let [nx, ny, _] = before.dims;
-    let voxel = |at: usize| USizeVec3::new(at % nx, at / nx % ny, at / (nx * ny));
-    let half = (bone.cut_nodes() + 1) / 2;
-    let is_gone = |at: &usize| {
-        let place = voxel(*at).as_ivec3();
-        let node = bone.cut_nodes() * place;
+    let (nodes, half) = (bone.cut_nodes(), (bone.cut_nodes() + 1) / 2);
+    let is_gone = |at: usize, place: IVec3| {
+        let node = nodes * place;
         let near =
             (-half..=half).flat_map(|z| (-half..=half).flat_map(move |y| (-half..=half).map(move |x| (x, y, z))));
         let cut = bone.is_cut_near(node - half, node + half)
             && near.into_iter().any(|offset| cut_depth(bone.cut_at(node + IVec3::from(offset))) >= 0.0);
-        is_gone(before.data[*at], bone.ct(place), cut, bone.isovalue()) == Some(true)
+        is_gone(before.data[at], bone.ct(place), cut, bone.isovalue()) == Some(true)
     };
-    let gone = (0..before.data.len()).filter(is_gone).map(|at| before.centre_of(voxel(at).to_array()));
-    gone.fold(None, |corners: Option<(DVec3, DVec3)>, place| {
-        Some(corners.map_or((place, place), |(low, high)| (low.min(place), high.max(place))))
-    })
+    // Bone that was not cut is gone where the CT differs.
+    let in_row = |(row, was): (usize, &[i16])| {
+        let start = IVec3::new(0, (row % ny) as i32, (row / ny) as i32);
+        let (low, high) = (nodes * start - half, nodes * start.with_x(nx as i32 - 1) + half);
+        let near = bone.is_cut_near(low, high);
+        let is_gone = |x: &i32| {
+            let place = start.with_x(*x);
+            (near || was[*x as usize] != bone.ct(place)) && is_gone(row * nx + *x as usize, place)
+        };
+        let first = (0..nx as i32).find(is_gone)?;
+        let last = (first..nx as i32).rfind(is_gone)?;
+        Some([first, last].map(|x| before.centre_of(start.with_x(x).to_array().map(|n| n as usize))))
+    };
+    let rows = before.data.par_chunks(nx.max(1)).enumerate().filter_map(in_row);
+    let ends = rows.map(|[a, b]| (a.min(b), a.max(b)));
+    ends.reduce_with(|(low, high), (a, b)| (low.min(a), high.max(b)))
 }
 
 /// A box of the CT's voxels.

@@ -20,6 +20,7 @@
 //! node of the brain.
 
 use glam::IVec3;
+use rayon::prelude::*;
 use std::sync::Arc;
 use trepan_contact::NodalContacts;
 use trepan_deformable::{BorderNode, ConfigError, Hollow, SlidingWall};
@@ -68,13 +69,12 @@ impl BoneMask {
     fn of(bone: &BoneVolume) -> Self {
         let dims = bone.dims();
         let mut bits = vec![0u64; (dims[0] * dims[1] * dims[2]).div_ceil(64)];
-        let mut at = 0;
-        for (k, j) in (0..dims[2] as i32).flat_map(|k| (0..dims[1] as i32).map(move |j| (k, j))) {
-            for i in 0..dims[0] as i32 {
-                bits[at / 64] |= u64::from(bone.is_bone(IVec3::new(i, j, k))) << (at % 64);
-                at += 1;
-            }
-        }
+        let [nx, ny, nz] = dims;
+        let place = |at: usize| IVec3::from([at % nx, at / nx % ny, at / (nx * ny)].map(|n| n as i32));
+        bits.par_iter_mut().enumerate().for_each(|(word, bits)| {
+            let voxels = 64 * word..(64 * word + 64).min(nx * ny * nz);
+            *bits = voxels.fold(0, |bits, at| bits | u64::from(bone.is_bone(place(at))) << (at % 64));
+        });
         Self { dims, bits }
     }
 
@@ -92,11 +92,11 @@ impl SkullWall {
         let low = bounds.min - MARGIN_MM;
         let dims = (bounds.size() + 2.0 * MARGIN_MM).to_array().map(|mm| (mm / SPACING_MM) as usize + 1);
         let mut mask = VoxelVolume::isotropic(dims, low, SPACING_MM, 0u8);
-        for (at, value) in mask.data.iter_mut().enumerate() {
+        mask.data.par_iter_mut().enumerate().for_each(|(at, value)| {
             let voxel = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
             let world = low + SPACING_MM * Vec3::from_array(voxel.map(|i| i as f32));
             *value = u8::from(bone.is_bone(bone.voxel_of(world)));
-        }
+        });
         let field = DistanceField::of_mask(&mask);
         let mut wall = SlidingWall::around(brain, fixed)?;
         wall.ahead_mm = NEAR_MM;

@@ -96,10 +96,14 @@ impl Opening {
         brain: Option<&VoxelVolume<u8>>,
         recipe: &Recipe,
     ) -> Result<Self, SessionError> {
-        let (reference, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
-        let inside = brain.map(Inside::of);
-        let opening = Self::of_patient(&bone_of(&reference, isovalue_hu)?, inside.as_ref(), recipe.opening)?;
-        opening.on(&bone_of(skull, isovalue_hu)?, brain.is_some())
+        let reference = || {
+            let (reference, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
+            bone_of(&reference, isovalue_hu)
+        };
+        let here = || (brain.map(Inside::of), bone_of(skull, isovalue_hu));
+        let (reference, (inside, skull)) = rayon::join(reference, here);
+        let opening = Self::of_patient(&reference?, inside.as_ref(), recipe.opening)?;
+        opening.on(&skull?, brain.is_some())
     }
 
     /// Chooses where to open a patient's skull, on voxels of 1 mm (`REFERENCE_MM`). The place lies
