@@ -345,7 +345,10 @@ mod tests {
         classes.data[100..].fill(1);
         let source = |codes, names| TissueSource { class: TissueClass::Tumour, path: path.clone(), codes, names };
         let seven = source(vec![7], Vec::new());
-        let mask = seven.read(&mut Vec::new()).unwrap();
+        let read = |source: &TissueSource| {
+            TissueSource::read_all(std::slice::from_ref(source), &mut Vec::new()).map(|mut masks| masks.remove(0))
+        };
+        let mask = read(&seven).unwrap();
         let remark = seven.paint(mask.clone(), DAffine3::IDENTITY, &mut classes).unwrap();
         assert!(remark.contains("0.2 ml of the 0.3 ml"), "{remark}");
         let count = |code| classes.data.iter().filter(|&&v| v == code).count();
@@ -354,11 +357,11 @@ mod tests {
         let outside = seven.paint(mask, aside, &mut classes).unwrap_err().to_string();
         assert!(outside.contains("none of it in the brain"), "{outside}");
         let mostly = DAffine3::from_translation(-DVec3::Z);
-        let other = seven.paint(seven.read(&mut Vec::new()).unwrap(), mostly, &mut classes).unwrap_err().to_string();
+        let other = seven.paint(read(&seven).unwrap(), mostly, &mut classes).unwrap_err().to_string();
         assert!(other.contains("another patient's"), "{other}");
-        let fault = source(vec![8], Vec::new()).read(&mut Vec::new()).unwrap_err().to_string();
+        let fault = read(&source(vec![8], Vec::new())).unwrap_err().to_string();
         assert!(fault.contains("labels.nii") && fault.contains("labels [8]"), "{fault}");
-        let fault = source(Vec::new(), vec!["oedema".into()]).read(&mut Vec::new()).unwrap_err().to_string();
+        let fault = read(&source(Vec::new(), vec!["oedema".into()])).unwrap_err().to_string();
         assert!(fault.contains("oedema") && fault.contains("give codes"), "{fault}");
     }
 
