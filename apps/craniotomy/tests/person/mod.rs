@@ -149,6 +149,14 @@ impl Person {
         Recording::open(&all.last().unwrap().join("session.mcap")).unwrap_or_default()
     }
 
+    /// All recordings, oldest first, and whether their session has its summary.
+    pub fn recordings(&self) -> Vec<(Recording, bool)> {
+        let mut all = self.sessions("session.mcap");
+        all.sort();
+        let open = |path: &PathBuf| Recording::open(&path.join("session.mcap")).unwrap_or_default();
+        all.iter().map(|path| (open(path), path.join("summary.json").is_file())).collect()
+    }
+
     /// Its newest tick.
     pub fn tick(&self) -> TickRecord {
         self.recording().ticks.last().copied().unwrap_or_default()
@@ -162,6 +170,11 @@ impl Person {
     /// Whether the program still runs.
     pub fn is_there(&self) -> bool {
         Path::new(&format!("/proc/{}/exe", self.program.id())).exists()
+    }
+
+    /// Exit code of the program, -1 after a signal; `None` while it runs.
+    pub fn code(&mut self) -> Option<i32> {
+        self.program.try_wait().unwrap().map(|status| status.code().unwrap_or(-1))
     }
 
     /// What the program wrote on its console.
