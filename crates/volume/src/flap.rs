@@ -22,6 +22,9 @@
 use crate::BoneVolume;
 use glam::{IVec3, Vec3};
 
+/// Most places where a search may begin.
+const MOST_SEEDS: usize = 4097;
+
 /// Most voxels of a piece; a larger one counts as connected to the skull.
 const MOST: usize = 1 << 20;
 
@@ -57,15 +60,23 @@ impl FlapSearch {
         let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
         let low = bone.voxel_of(centre - reach_mm).clamp(IVec3::ZERO, last);
         let dims = bone.voxel_of(centre + reach_mm).clamp(low, last) - low + 1;
-        let steps = (2.0 * from.distance(to) / bone.spacing_mm()).ceil().clamp(1.0, 4096.0) as usize;
-        let way = (0..=steps).map(|step| bone.voxel_of(from.lerp(to, step as f32 / steps as f32)));
-        let inside = |voxel: &IVec3| voxel.cmpge(low).all() && voxel.cmplt(low + dims).all();
-        let mut seeds: Vec<IVec3> = way.filter(inside).collect();
-        seeds.dedup();
         let voxels = dims.as_usizevec3().element_product();
         let piece = Vec::with_capacity(voxels.min(MOST));
-        let seen = vec![0; voxels.div_ceil(64)];
-        Self { low, dims, seeds, seen, piece, next: 0, found: FlapState::NotYet, begun: false }
+        let (seeds, seen) = (Vec::with_capacity(MOST_SEEDS), vec![0; voxels.div_ceil(64)]);
+        let mut search = Self { low, dims, seeds, seen, piece, next: 0, found: FlapState::NotYet, begun: false };
+        search.seed(bone, from, to);
+        search
+    }
+
+    /// Restarts the search at the first bone on another line, world mm. Allocates nothing.
+    pub fn seed(&mut self, bone: &BoneVolume, from: Vec3, to: Vec3) {
+        let steps = (2.0 * from.distance(to) / bone.spacing_mm()).ceil().clamp(1.0, MOST_SEEDS as f32 - 1.0) as usize;
+        let way = (0..=steps).map(|step| bone.voxel_of(from.lerp(to, step as f32 / steps as f32)));
+        let (low, end) = (self.low, self.low + self.dims);
+        self.seeds.clear();
+        self.seeds.extend(way.filter(|voxel| voxel.cmpge(low).all() && voxel.cmplt(end).all()));
+        self.seeds.dedup();
+        self.restart();
     }
 
     /// Restarts the search; the next steps first clear the old one.

@@ -25,6 +25,8 @@ const INSIDE_MM: f32 = 35.0;
 const VAULT_MM: f32 = 15.0;
 /// Margin around a flap in which bone counts as the skull, mm.
 const AROUND_MM: f32 = 15.0;
+/// Distance from the opening up to which a piece is lifted where no flap is planned, mm.
+const PIECE_MM: f32 = 35.0;
 /// Half the width of a craniotome's cut, mm.
 const HALF_CUT_MM: f32 = 1.2;
 const STEP_MM: f32 = 0.1;
@@ -94,11 +96,12 @@ impl Plan {
         if inside { -nearest } else { nearest }
     }
 
-    /// Search for the free flap during drilling; `None` without a flap.
-    pub fn search(&self, bone: &BoneVolume) -> Option<FlapSearch> {
+    /// Search for the free flap during drilling; without a flap, for any piece around the opening.
+    pub fn search(&self, bone: &BoneVolume) -> FlapSearch {
         let Site { entry, inward, .. } = self.site;
         let (from, to) = (entry - OUTSIDE_MM * inward, entry + VAULT_MM * inward);
-        (!self.outline.is_empty()).then(|| FlapSearch::new(bone, entry, self.flap_mm + AROUND_MM, from, to))
+        let reach_mm = if self.outline.is_empty() { PIECE_MM } else { self.flap_mm };
+        FlapSearch::new(bone, entry, reach_mm + AROUND_MM, from, to)
     }
 
     /// Centre of the burr hole on the outer table.

@@ -251,6 +251,7 @@ fn panel_texts() -> Vec<String> {
         What::NotOpen,
         What::FlapFree(1.0),
         What::FlapHangs,
+        What::PieceHangs,
         What::FlapLifted(1.0),
         What::FlapReturned,
     ];

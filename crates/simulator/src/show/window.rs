@@ -133,7 +133,7 @@ struct Show {
     requests: Requests,
     rate: Rate,
     raycast: Raycast,
-    /// Whether no flap is planned.
+    /// Whether there is no bone to lift.
     no_flap: bool,
     guide: Option<Guide>,
     /// A 3-D mouse in the other hand.
@@ -203,7 +203,7 @@ pub(crate) fn show(
         requests: Requests::first(opened.slot),
         rate: Rate::default(),
         raycast: Raycast::of(opened.table),
-        no_flap: opened.table.plan.outline.is_empty(),
+        no_flap: opened.table.bone().is_none(),
         guide: opened.guide.clone(),
         knob: opened.knob.then(|| SpaceMouse::open(&spacemouse::Config::default()).ok()).flatten(),
     };

@@ -1,15 +1,16 @@
-//! The planned bone flap: detects when it is cut free, lifts it and puts it back.
+//! The bone flap: detects when it is cut free, lifts it and puts it back.
 //!
 //! # Practice
-//! After each stroke of a cutting tool a flood fill starts in the middle of the flap. It visits a
-//! few hundred voxels per tick while nothing cuts ([`FlapSearch`]). Lifting and putting back write
+//! After each stroke of a cutting tool a flood fill starts in the middle of the planned flap. It
+//! visits a few hundred voxels per tick while nothing cuts ([`FlapSearch`]). Where no flap is
+//! planned it starts below the tool when asked to lift, and a free piece is lifted. Lifting and putting back write
 //! a fixed number of voxels per tick. Everything depends on the ticks alone, so a replay lifts the
 //! same voxels. Bone under the isovalue at the flap's rim is not lifted. What the CT shows in the
 //! cut beside the flap goes with it: else the density between the two would leave a thin wall.
 
 use crate::stages::notice::{Hindrance, What};
 use glam::IVec3;
-use trepan_geometry::Buttons;
+use trepan_geometry::{Buttons, Vec3};
 use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, FlapState};
 
 /// Voxels visited by the flood fill in a tick: some 15 us.
@@ -57,6 +58,7 @@ struct Lifted {
 #[derive(Clone, Debug)]
 pub(crate) struct Flap {
     search: FlapSearch,
+    planned: bool,
     at: State,
     lifted: Vec<Lifted>,
     stroke: bool,
@@ -65,10 +67,12 @@ pub(crate) struct Flap {
 }
 
 impl Flap {
-    /// Makes a flap attached to the skull; allocates all memory.
-    pub fn new(search: FlapSearch) -> Self {
+    /// Makes a flap attached to the skull, `planned` or to be chosen by the tool; allocates all
+    /// memory.
+    pub fn new(search: FlapSearch, planned: bool) -> Self {
         Self {
             search,
+            planned,
             at: State::Skull,
             lifted: Vec::with_capacity(1 << 20),
             stroke: false,
@@ -105,19 +109,25 @@ impl Flap {
     }
 
     /// Runs a tick, after the contact with bone; returns a notice. `cut`: bone was removed in this
-    /// tick, `hinders`: why the flap cannot be moved now.
+    /// tick, `hinders`: why the flap cannot be moved now, `below`: ends of the line below the tool.
     pub fn tick(
         &mut self,
         bone: &BoneVolume,
         buttons: Buttons,
         (drilling, cut): (bool, bool),
         hinders: Option<Hindrance>,
+        below: [Vec3; 2],
     ) -> Option<What> {
         let pressed = buttons.has(Buttons::FLAP);
         let before = std::mem::replace(&mut self.was_requested, pressed);
         let hinders = hinders.or(self.moves().then_some(Hindrance::FlapMoves));
         let refused = hinders.filter(|_| pressed && !before).map(What::FlapWaits);
         let requested = pressed && !before && hinders.is_none();
+        if requested && !self.planned && matches!(self.at, State::Skull | State::Searched | State::Cut) {
+            self.search.seed(bone, below[0], below[1]);
+            self.at = State::Searched;
+            return None;
+        }
         self.advance(bone, (drilling, cut), requested).or(refused)
     }
 
@@ -128,7 +138,7 @@ impl Flap {
                 self.at = if self.at == State::Cut && !cut { State::Cut } else { State::Skull };
                 None
             }
-            State::Skull if self.stroke => {
+            State::Skull if self.stroke && self.planned => {
                 self.stroke = false;
                 self.search.restart();
                 self.at = State::Searched;
@@ -160,7 +170,12 @@ impl Flap {
             FlapState::NotYet => None,
             FlapState::Hanging => {
                 (self.at, self.reported) = (State::Skull, false);
-                requested.then_some(What::FlapHangs)
+                if self.planned { requested.then_some(What::FlapHangs) } else { Some(What::PieceHangs) }
+            }
+            FlapState::Free if !self.planned => {
+                self.lifted.clear();
+                self.at = State::Lifting(0);
+                None
             }
             FlapState::Free => {
                 self.at = State::Cut;
@@ -206,8 +221,32 @@ impl Flap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trepan_geometry::Vec3;
     use trepan_volume::VoxelVolume;
+
+    #[test]
+    fn without_a_plan_the_free_piece_below_the_tool_is_lifted() {
+        let mut ct = VoxelVolume::isotropic([60, 60, 8], Vec3::ZERO, 1.0, AIR_HU);
+        ct.data[60 * 60 * 2..60 * 60 * 6].fill(900);
+        for at in (0..ct.data.len()).filter(|at| (at % 60).abs_diff(40).max((at / 60 % 60).abs_diff(30)) == 5) {
+            ct.data[at] = AIR_HU;
+        }
+        let bone = BoneVolume::new(&ct, 400).unwrap();
+        let above = |x: f32| Vec3::new(x, 30.0, 9.0);
+        let [from, to] = [above(30.0), above(30.0) - 9.0 * Vec3::Z];
+        let mut flap = Flap::new(FlapSearch::new(&bone, above(30.0), 25.0, from, to), false);
+        let mut asks = |x: f32| {
+            let below = [above(x), above(x) - 9.0 * Vec3::Z];
+            let mut tick = |buttons| flap.tick(&bone, buttons, (false, false), None, below);
+            let first = tick(Buttons::FLAP);
+            let later: Vec<What> = first.into_iter().chain((0..200).filter_map(|_| tick(Buttons(0)))).collect();
+            later
+        };
+        assert_eq!(asks(30.0), [What::PieceHangs]);
+        assert_eq!(asks(40.0), [What::FlapLifted((9 * 9 * 4) as f32)]);
+        assert!(!bone.is_bone(IVec3::new(40, 30, 4)) && bone.is_bone(IVec3::new(30, 30, 4)));
+        assert_eq!(asks(30.0), [What::FlapReturned]);
+        assert!(bone.is_bone(IVec3::new(40, 30, 4)));
+    }
 
     #[test]
     fn a_flap_is_found_lifted_and_put_back_voxel_by_voxel() {
@@ -216,10 +255,13 @@ mod tests {
         let bone = BoneVolume::new(&ct, 400).unwrap();
         let middle = Vec3::new(30.0, 30.0, 4.0);
         let search = FlapSearch::new(&bone, middle, 25.0, middle + 6.0 * Vec3::Z, middle - 6.0 * Vec3::Z);
-        let mut flap = Flap::new(search);
+        let mut flap = Flap::new(search, true);
         let run = |flap: &mut Flap, ticks: usize, buttons, drilling, cut| {
             (0..ticks)
-                .filter_map(|_| flap.tick(&bone, buttons, (drilling, cut), drilling.then_some(Hindrance::Pedal)))
+                .filter_map(|_| {
+                    let hinders = drilling.then_some(Hindrance::Pedal);
+                    flap.tick(&bone, buttons, (drilling, cut), hinders, [middle; 2])
+                })
                 .collect::<Vec<_>>()
         };
         let none = Buttons(0);

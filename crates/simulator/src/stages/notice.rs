@@ -128,7 +128,7 @@ pub enum What {
     NotChanged,
     /// Moving the flap was requested and is not possible now.
     FlapWaits(Hindrance),
-    /// Moving a flap was requested where none is planned.
+    /// Moving a flap was requested where there is no bone.
     NoFlap,
     /// A tool was taken.
     Taken(Tool),
@@ -138,6 +138,8 @@ pub enum What {
     FlapFree(f32),
     /// Lifting the flap was requested while it is still attached to the skull.
     FlapHangs,
+    /// Lifting was requested where no flap is planned, and the bone below the tool is not free.
+    PieceHangs,
     /// The flap was lifted; its volume, mm³.
     FlapLifted(f32),
     /// The flap was put back.
@@ -234,7 +236,7 @@ pub struct Notice {
 
 impl Notice {
     /// Why no flap moves.
-    pub const NO_FLAP: &'static str = "no flap is planned: set its diameter on the start page, or give --flap";
+    pub const NO_FLAP: &'static str = "no bone is drilled here, so none can be lifted";
     /// Why no tool for the brain is taken.
     pub const NOT_OPEN: &'static str = "the bone is not open: drill through it or lift the flap first";
 
@@ -268,6 +270,9 @@ impl Notice {
             What::NotOpen => ("refused", Self::NOT_OPEN.into()),
             What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
             What::FlapHangs => ("refused", "the flap is still attached to the skull: cut it free first".into()),
+            What::PieceHangs => {
+                ("refused", "no free piece of bone below the tool: cut one free, and point at it".into())
+            }
             What::FlapLifted(mm3) => ("flap", format!("the flap is lifted: {mm3:.0} mm3 of bone")),
             What::FlapReturned => ("flap", "the flap is back in its place".into()),
             What::Force { waits, second } => {

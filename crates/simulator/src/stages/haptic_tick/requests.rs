@@ -8,7 +8,11 @@ use crate::stages::notice::{Hindrance, What};
 use crate::stages::second_hand::SecondHand;
 use crate::stages::tray::Change;
 use crate::stages::undo::{Answer, Place, Stroke};
-use trepan_geometry::{Buttons, Pose, ToolKind, ToolState};
+use trepan_geometry::{Buttons, Pose, ToolKind, ToolState, Vec3};
+
+/// Ends of the line along the shaft on which a piece of bone is lifted, from the tip, mm.
+const ABOVE_MM: f32 = 5.0;
+const BELOW_MM: f32 = 20.0;
 
 impl HapticStage {
     /// Whether the tool cuts. A perforator's clutch disengages once it is through; nothing cuts
@@ -75,7 +79,9 @@ impl HapticStage {
         let before = std::mem::replace(&mut self.asked_flap, pressed);
         match (&self.bone, &mut self.flap) {
             (Some(bone), Some(flap)) => {
-                flap.tick(bone, tool.buttons, (drilling, cut), hinders).into_iter().for_each(report);
+                let shaft = tool.world_from_tool.rotation * Vec3::Z;
+                let below = [ABOVE_MM, -BELOW_MM].map(|mm| tool.tip() + mm * shaft);
+                flap.tick(bone, tool.buttons, (drilling, cut), hinders, below).into_iter().for_each(report);
             }
             _ if pressed && !before => report(What::NoFlap),
             _ => {}
