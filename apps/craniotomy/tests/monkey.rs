@@ -1,7 +1,8 @@
 //! A seeded monkey with mouse and keys in front of a real window. If it says yes to the question
 //! whether the session shall end, it plays on on the other pages, and if it closes the window, it
-//! begins again. Needs Xvfb and xdotool; without them it says so and ends. `TREPAN_MONKEY_MINUTES` lets it play longer, `TREPAN_MONKEY_SEED`
-//! otherwise, `TREPAN_PERSON_PROGRAM` with another program's file.
+//! begins again. Needs Xvfb and xdotool; without them it says so and ends. `TREPAN_MONKEY_MINUTES`
+//! lets it play longer, `TREPAN_MONKEY_SEED` otherwise, `TREPAN_PERSON_PROGRAM` with another
+//! program's file.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 

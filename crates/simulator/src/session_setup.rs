@@ -15,7 +15,6 @@ use crate::report::regions::{Region, regions};
 use crate::run::{self, Stages};
 use crate::solver::{self, Ran};
 use crate::stages::collision_step::CollisionStage;
-use crate::stages::flap::Flap;
 use crate::stages::haptic_config::{BONE, HapticConfig, TISSUE, bone_force};
 use crate::stages::haptic_tick::HapticStage;
 use crate::stages::second_hand::SecondHand;
@@ -145,10 +144,11 @@ impl SessionSetup {
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
         let tissue = self.brain().map(|brain| self.tissue(brain, &rigid, &with)).transpose()?;
         let second = second.map(|limits| SecondHand::new(config(limits), bone.clone(), field.clone()));
-        let search = bone.as_ref().map(|bone| Flap::new(self.plan.search(bone), !self.plan.outline.is_empty()));
+        let search = bone.as_ref().map(|bone| self.plan.search(bone));
         let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
         let mut haptic = HapticStage::new(config(limits), bone, field, start);
-        haptic = search.into_iter().fold(haptic, HapticStage::with_flap);
+        let planned = !self.plan.outline.is_empty();
+        haptic = search.into_iter().fold(haptic, |haptic, search| haptic.with_flap(search, planned));
         haptic = forbidden.map(Arc::new).into_iter().fold(haptic, HapticStage::forbidding);
         Ok(Stages { haptic, second, tissue })
     }

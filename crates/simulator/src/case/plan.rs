@@ -198,9 +198,8 @@ mod tests {
         }
         let planned = plan.of(&bone.snapshot(), 400).len() as f32;
         assert!((planned / (std::f32::consts::PI * 16.2f32.powi(2) * 6.1) - 1.0).abs() < 0.06, "{planned}");
-        assert!(plan.search(&bone).is_some());
         let hole = Plan::new(Some(&bone), site, 3.0, 0.0).unwrap();
-        assert!(hole.search(&bone).is_none() && hole.takes(site.entry) && !hole.takes(site.entry + 4.0 * Vec3::Z));
+        assert!(hole.takes(site.entry) && !hole.takes(site.entry + 4.0 * Vec3::Z));
         assert!(Plan::new(Some(&bone), site, 3.0, 90.0).is_none(), "wider than the skull");
     }
 

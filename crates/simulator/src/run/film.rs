@@ -15,10 +15,10 @@
 //! ```
 //!
 //! # Practice
-//! A live session's film is taken by a thread of its own, some 0.1 ms a shot, and is at most a tick
-//! or two ahead of the tick that it names. Memory holds the bricks of the skull that changed, at the
-//! last shot, and the nodes of some shots, 6 bytes each. Without a scene file a minute of craniotomy is made again in a second;
-//! with the brain, in about the time of the solver.
+//! A live session's film is taken by a thread of its own, some 0.1 ms a shot, and is at most a
+//! tick or two ahead of the tick that it names. Memory holds the bricks of the skull that changed,
+//! at the last shot, and the nodes of some shots, 6 bytes each. Without a scene file a minute of
+//! craniotomy is made again in a second; with the brain, in about the time of the solver.
 
 use crate::run::View;
 use crate::run::stop::Stop;
@@ -106,8 +106,8 @@ pub(crate) struct Filming {
 }
 
 impl Filming {
-    /// Makes a film of a session that carves a skull, given with the CT of all its voxels as it is
-    /// now, with a brain whose nodes are at `rest`. A length of `None` is not known yet.
+    /// Makes a film of a session that carves a skull, with a brain whose nodes are at `rest`. A
+    /// length of `None` is not known yet.
     pub fn new(skull: Option<Skull>, rest: Vec<Vec3>, length_ms: Option<f64>) -> Self {
         let brain_every_ms = length_ms.map_or(BRAIN_MS, |length_ms| (length_ms / BRAINS).max(SHOT_MS));
         let (skull, last_notices) = (skull.map(Carved::of), (0, None));

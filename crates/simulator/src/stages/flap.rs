@@ -3,10 +3,11 @@
 //! # Practice
 //! After each stroke of a cutting tool a flood fill starts in the middle of the planned flap. It
 //! visits a few hundred voxels per tick while nothing cuts ([`FlapSearch`]). Where no flap is
-//! planned it starts below the tool when asked to lift, and a free piece is lifted. Lifting and putting back write
-//! a fixed number of voxels per tick. Everything depends on the ticks alone, so a replay lifts the
-//! same voxels. Bone under the isovalue at the flap's rim is not lifted. What the CT shows in the
-//! cut beside the flap goes with it: else the density between the two would leave a thin wall.
+//! planned it starts below the tool when asked to lift, and a free piece is lifted. Lifting and
+//! putting back write a fixed number of voxels per tick. Everything depends on the ticks alone, so
+//! a replay lifts the same voxels. Bone under the isovalue at the flap's rim is not lifted. What
+//! the CT shows in the cut beside the flap goes with it: else the density between the two would
+//! leave a thin wall.
 
 use crate::stages::notice::{Hindrance, What};
 use glam::IVec3;
@@ -256,7 +257,7 @@ mod tests {
         let middle = Vec3::new(30.0, 30.0, 4.0);
         let search = FlapSearch::new(&bone, middle, 25.0, middle + 6.0 * Vec3::Z, middle - 6.0 * Vec3::Z);
         let mut flap = Flap::new(search, true);
-        let run = |flap: &mut Flap, ticks: usize, buttons, drilling, cut| {
+        let run = |flap: &mut Flap, ticks: usize, buttons, drilling: bool, cut| {
             (0..ticks)
                 .filter_map(|_| {
                     let hinders = drilling.then_some(Hindrance::Pedal);

@@ -43,7 +43,7 @@ use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_rigid::spindle::Spindle;
 use trepan_rigid::{RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, DistanceField};
+use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
 impl HapticStage {
     /// Runs a tick; notices go to `notify`. The caller applies the wrench.
@@ -237,9 +237,10 @@ impl HapticStage {
         }
     }
 
-    /// Adds a flap that can be lifted once it is cut free.
-    pub(crate) fn with_flap(self, flap: Flap) -> Self {
-        Self { flap: Some(flap), ..self }
+    /// Adds a flap that can be lifted once it is cut free; if it is not `planned`, the free piece
+    /// below the tool.
+    pub fn with_flap(self, search: FlapSearch, planned: bool) -> Self {
+        Self { flap: Some(Flap::new(search, planned)), ..self }
     }
 
     /// Adds the distance field of structures that no tool may come close to.

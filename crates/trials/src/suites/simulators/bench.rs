@@ -44,7 +44,7 @@ impl Bench {
     ) -> Self {
         let start = intent.read(0.0).tool;
         let stage = HapticStage::new(config(program), Some(bone), Some(brain), start);
-        let stage = search.into_iter().fold(stage, HapticStage::with_flap);
+        let stage = search.into_iter().fold(stage, |stage, search| stage.with_flap(search, true));
         let hand = Simulated::new(Config::TOUCH, grip, intent);
         Self { stage, hand, dt_ms: 1.0, records: Vec::new(), notices: Vec::new() }
     }

@@ -18,7 +18,7 @@ pub fn findings(table: &CaseFixture) -> Findings {
     let (before, pieces) = (bone.snapshot(), Piece::all(&bone));
     let how = Plan { outline: table.flap.outline.clone(), ..Plan::default() };
     let script = Script::planned("flap", &table.flap.site, END_MS, &how).expect("the site is sound");
-    let search = table.flap.search(&bone);
+    let search = Some(table.flap.search(&bone));
     let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, search, HandModel::FIRM, Box::new(script));
     // At the tick that finds it free the flood's answer is held against all pieces of the skull.
     let (mut free, mut cut_off, mut found_mm3) = (0, Vec::new(), 0.0f32);
