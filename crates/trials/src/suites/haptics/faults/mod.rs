@@ -3,14 +3,11 @@
 //!
 //! # Practice
 //! A loop like a session's requests 1 N; then the fault begins. libHD and libdrd are given time
-//! tick
-//! by tick, so that 1 ms is one tick and every run is identical. Haply's service runs in parallel
-//! in
-//! real time: of several runs the gates use the one that the machine disturbed least; the slowest
-//! is
-//! reported too. While the library itself pauses, no code can reach the motors: the time counts
-//! from
-//! its return. `Kept` are faults that must not remove the force.
+//! tick by tick, so that 1 ms is one tick and every run is identical. Haply's service runs in
+//! parallel in real time: runs are added until the machine left enough of them alone, by their
+//! longest tick and not by their result; the gates use the run that it disturbed least, and the
+//! slowest is reported too. While the library itself pauses, no code can reach the motors: the time
+//! counts from its return. `Kept` are faults that must not remove the force.
 
 mod force_dimension;
 mod haply;
@@ -19,6 +16,7 @@ mod openhaptics;
 use super::Scope;
 use crate::engine::suite::{Gate, Row};
 use std::path::Path;
+use std::time::Instant;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
 use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_haptics::{DeviceError, Fault, HapticDevice, Status};
@@ -123,6 +121,8 @@ struct Course {
     largest_n: f64,
     rise_n: f64,
     told: Option<Fault>,
+    /// Longest tick after the fault, ms.
+    held_ms: f64,
 }
 
 /// Waits until the force is reached, starts the fault, and observes.
@@ -146,9 +146,12 @@ fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
         largest_n,
         rise_n,
         told: None,
+        held_ms: 0.0,
     };
     for _ in 0..WATCHED_TICKS {
+        let began = Instant::now();
         let now = bench.tick();
+        course.held_ms = course.held_ms.max(1e3 * began.elapsed().as_secs_f64());
         course.largest_n = course.largest_n.max(now.force_n);
         course.rise_n = course.rise_n.max(now.force_n - course.after_n);
         course.after_n = now.force_n;
