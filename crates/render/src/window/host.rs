@@ -104,8 +104,9 @@ impl Offers {
     }
 }
 
-/// Time between two looks at what has changed.
-const POLL: Duration = Duration::from_millis(100);
+/// Time between two looks at what has changed, with a card and without: a picture of a page takes
+/// processors about 90 ms, which an import beside it needs.
+const POLL: [Duration; 2] = [Duration::from_millis(100), Duration::from_millis(500)];
 
 /// Type of the session and the painter in the window.
 type Lending = Lent<Sent, Painter>;
@@ -206,13 +207,14 @@ impl<H: Host> Pages<H> {
         if !dropped.is_empty() {
             host.dropped(dropped.into_iter().map(|file| file.path().to_path_buf()).collect());
         }
+        let poll = POLL[usize::from(self.device.as_ref().is_none_or(Gpu::is_software))];
         let actions = match host.shown(guest.is_some()) {
             Shown::Page(page) => {
                 guest.take().into_iter().for_each(Guest::leave);
                 let frame = egui::Frame::central_panel(ui.style()).inner_margin(16.0);
                 let drawn = egui::CentralPanel::default().frame(frame);
                 let actions = drawn.show(ui, |ui| page::show(ui, &page, &mut self.textures)).inner;
-                ui.request_repaint_after(POLL);
+                ui.request_repaint_after(poll);
                 actions
             }
             Shown::Session(strip) => {
@@ -224,7 +226,7 @@ impl<H: Host> Pages<H> {
                     shown.window.show(ui, state);
                     if shown.window.is_over() { shown.leave() } else { *guest = Some(shown) }
                 }
-                ui.request_repaint_after(POLL);
+                ui.request_repaint_after(poll);
                 strip.unwrap_or_default()
             }
             Shown::Nothing => {

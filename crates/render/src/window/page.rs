@@ -336,7 +336,8 @@ fn draw<A: Clone>(ui: &mut egui::Ui, item: &Item<A>, textures: &mut Textures, do
         Item::Field(name, value, empty, does) => write(ui, [name, value, empty], *does, done),
         Item::Amount(amount, does) => _ = ui.horizontal_wrapped(|ui| slide(ui, amount, *does, done)),
         Item::Progress(share, text) => {
-            ui.add(egui::ProgressBar::new(*share).text(tr(text)).animate(true).desired_height(22.0));
+            // An animated bar would be drawn as often as the machine can, which the work needs.
+            ui.add(egui::ProgressBar::new(*share).text(tr(text)).desired_height(22.0));
         }
         Item::Picture(picture) => look(ui, picture, f32::INFINITY, textures, done),
         Item::Table(rows) => table(ui, rows),
