@@ -277,6 +277,27 @@ fn a_drill_pressed_too_hard_stalls_with_a_warning() {
 }
 
 #[test]
+fn a_craniotome_is_said_to_be_caught_when_led_on_too_fast_and_not_before() {
+    let caught = |mm_per_ms: f32| {
+        let mut bench = Bench::new(Program::Craniotomy);
+        let take = Buttons::take(ToolKind::Craniotome);
+        (0..50).for_each(|_| _ = bench.step(ToolState { buttons: take, ..at(20.0, 0.0) }, Status::Fresh, &NO_PATCH));
+        let mut place = Vec3::new(0.0, 0.0, 20.0);
+        let ways = [(Vec3::new(-30.0, 0.0, 20.0), 0.05), (Vec3::new(-30.0, 0.0, -7.5), 0.05)];
+        for (to, mm_per_ms) in ways.into_iter().chain([(Vec3::new(-16.0, 0.0, -7.5), mm_per_ms)]) {
+            while place != to {
+                place = place.move_towards(to, mm_per_ms);
+                let tool = ToolState { world_from_tool: Pose::from_translation(place), ..at(0.0, 0.0) };
+                bench.step(ToolState { buttons: Buttons::PEDAL, ..tool }, Status::Fresh, &NO_PATCH);
+            }
+        }
+        assert!(bench.stage.scores().bone_removed_mm3 > 20.0, "it cuts");
+        bench.raised(Warning::CutterJams).is_some()
+    };
+    assert_eq!([0.001, 0.05].map(caught), [false, true]);
+}
+
+#[test]
 fn invalid_device_poses_are_replaced_by_the_last_valid_one_and_warned_of() {
     let mut bench = Bench::new(Program::Integrated);
     for _ in 0..400 {
@@ -376,6 +397,7 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
     assert!(last.wrench.force.length() > 1.0 && last.depth_mm > 0.5, "no bone is felt: {last:?}");
     assert!((0.02..0.16).contains(&last.tissue_n()), "{} N of 0.15 N", last.tissue_n());
     assert_eq!(bench.raised(Warning::BrainPressed), None);
+    assert!(bench.raised(Warning::RestsOnBone).is_some(), "nothing tells her what holds the probe");
     let scores = bench.stage.scores();
     assert!(scores.peak_tissue_force_n < 0.2 && scores.hand_peak_force_n > 1.0, "{scores:?}");
     assert!(scores.tissue_impulse_n_s < 0.2 * scores.tissue_s && scores.tissue_s > 1.0, "{scores:?}");

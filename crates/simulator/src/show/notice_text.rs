@@ -22,7 +22,7 @@ const DANGERS: [Warning; 6] = [
 ];
 
 /// Warnings of the operation without harm, after those.
-const CARE: [Warning; 2] = [Warning::BoneThin, Warning::DrillStalled];
+const CARE: [Warning; 4] = [Warning::BoneThin, Warning::DrillStalled, Warning::CutterJams, Warning::RestsOnBone];
 
 /// Returns the panel's contents that are common to all sessions.
 pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {

@@ -91,8 +91,12 @@ pub(crate) struct WarningInputs {
     pub ahead_mm: f32,
     /// Time until breakthrough, ms.
     pub breach_ms: f32,
+    /// Whether the tool is a craniotome.
+    pub craniotome: bool,
     /// Force of the tissue, N.
     pub tissue_n: f32,
+    /// Force of bone on a tool for the brain, N.
+    pub rest_n: f32,
     /// Distance from the tool to the nearest forbidden structure, mm.
     pub forbidden_mm: f32,
     /// The desired force, N.
@@ -148,6 +152,8 @@ impl WarningInputs {
             (Warning::DeviceStale, record.has(TickRecord::STALE), 0.0),
             (Warning::MotorsWarm, self.warm, self.desired_n),
             (Warning::TissueSlow, self.tissue_pace < REAL_TIME, self.tissue_pace),
+            (Warning::CutterJams, self.craniotome && drilling && record.has(TickRecord::CLAMPED), self.desired_n),
+            (Warning::RestsOnBone, self.rest_n > limits.brain_force_n, self.rest_n),
         ]
     }
 }

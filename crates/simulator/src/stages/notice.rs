@@ -37,6 +37,10 @@ pub enum Warning {
     ForbiddenNear,
     /// The simulated brain is slower than real time, so that it feels softer or stiffer than it is.
     TissueSlow,
+    /// A craniotome is led on with more force than its cut gives way to.
+    CutterJams,
+    /// A tool for the brain presses on bone.
+    RestsOnBone,
 }
 
 /// Texts of a warning.
@@ -51,7 +55,7 @@ struct Texts {
 
 impl Warning {
     /// All warnings, in the order of their bits.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::BoneThin,
         Self::BreakThrough,
         Self::BrainNear,
@@ -65,6 +69,8 @@ impl Warning {
         Self::BrainPressed,
         Self::ForbiddenNear,
         Self::TissueSlow,
+        Self::CutterJams,
+        Self::RestsOnBone,
     ];
 
     fn texts(self) -> Texts {
@@ -91,6 +97,16 @@ impl Warning {
                 "tissue-slow",
                 "the brain moves more slowly than in real time and feels wrong: close programs, or take a lower quality",
                 "of real time",
+            ),
+            Self::CutterJams => (
+                "cutter-jams",
+                "the craniotome is caught in its cut: lead it back a little, upright, then on more slowly",
+                "N wanted",
+            ),
+            Self::RestsOnBone => (
+                "rests-on-bone",
+                "the tool rests on bone, not on the brain: draw it back, and widen the hole if it is too narrow",
+                "N",
             ),
         };
         Texts { name, text, unit }

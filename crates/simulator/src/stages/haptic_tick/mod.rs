@@ -457,11 +457,14 @@ impl HapticStage {
     ) -> WarningInputs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
+        let (phase, craniotome) = (self.phase(), sample.tool.cutting_mm > 0.0);
         WarningInputs {
-            bare_cutter: self.phase() == Phase::Craniotomy && sample.tool.cutting_mm == 0.0,
+            bare_cutter: phase == Phase::Craniotomy && !craniotome,
+            craniotome,
             ahead_mm,
             breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
             tissue_n: record.tissue_n(),
+            rest_n: if phase == Phase::Brain { desired.bone.force.length() } else { 0.0 },
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
             desired_n: desired.sum().force.length(),
             stalled: record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some(),
