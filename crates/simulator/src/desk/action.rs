@@ -11,6 +11,10 @@ pub(crate) enum Action {
     Home,
     /// Shows the sessions that were kept.
     Sessions,
+    /// Shows only the sessions with these words.
+    Only(String),
+    /// Chooses a session to compare; with the second one, compares both in the browser.
+    Compare(PathBuf),
     /// Shows the lessons.
     Lessons,
     /// Begins a lesson.

@@ -172,6 +172,8 @@ impl Gallery {
         let last = self.keeps_sessions();
         self.act(Action::Sessions);
         look(self, "sessions");
+        self.act(Action::Compare(last.clone()));
+        look(self, "sessions-to-compare");
         self.act(Action::Result(last.clone()));
         look(self, "result");
         self.act(Action::Result(last.with_file_name("2026-03-06T10-20-30")));

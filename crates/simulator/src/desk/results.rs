@@ -7,7 +7,7 @@ use crate::report::kept::Kept;
 use crate::report::sessions::{self, SessionRow};
 use crate::settings::Recent;
 use crate::training::Lesson;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use trepan_render::window::{Item, Page};
 
 /// The page of a session's result.
@@ -87,35 +87,83 @@ fn home() -> Item<Action> {
     Item::main("Back to the start page", "your choices are kept", Action::Home)
 }
 
-/// The page of all sessions.
-pub(crate) fn list(kept: &[Kept], lessons: &[Lesson], recent: &[Recent]) -> Page<Action> {
-    let row = |session: &SessionRow| {
+/// All sessions, and what is done with them on their page.
+pub(crate) struct Sessions {
+    rows: Vec<SessionRow>,
+    /// Words that a session must have to be shown.
+    pub only: String,
+    /// The session that another one is compared with.
+    pub first: Option<PathBuf>,
+}
+
+impl Sessions {
+    pub fn of(kept: &[Kept], lessons: &[Lesson], recent: &[Recent]) -> Self {
+        Self { rows: sessions::rows(kept, lessons, recent), only: String::new(), first: None }
+    }
+
+    /// Chooses a session to compare; returns both once there are two.
+    pub fn compares(&mut self, folder: PathBuf) -> Option<[PathBuf; 2]> {
+        match self.first.take() {
+            Some(first) if first != folder => Some([first, folder]),
+            Some(_) => None,
+            None => {
+                self.first = Some(folder);
+                None
+            }
+        }
+    }
+
+    /// The page of them.
+    pub fn page(&self) -> Page<Action> {
+        let words = self.only.to_lowercase();
+        let has_words = |text: &str| words.split_whitespace().all(|word| text.to_lowercase().contains(word));
+        let shown = self.rows.iter().map(|session| (session, told(session)));
+        let rows: Vec<_> = shown.filter(|(_, told)| has_words(&told.join(", "))).map(|row| self.row(row)).collect();
+        let (all, count_of) = (self.rows.len(), count(rows.len(), "session"));
+        let none = rows.is_empty().then(|| match all {
+            0 => Item::Text("No session was kept yet.".into()),
+            _ => Item::Text("No session has all of these words.".into()),
+        });
+        let empty = "a name, a case, a lesson, a date, passed";
+        let only = Item::Field("Only with".into(), self.only.clone(), empty.into(), Action::Only);
+        let only = (all > 0).then_some(only);
+        Page {
+            title: "Sessions".into(),
+            line: format!("{count_of}, the newest first; none is ever overwritten"),
+            columns: vec![only.into_iter().chain(rows).chain(none).collect()],
+            foot: vec![home()],
+            escape: Some(Action::Home),
+            ..Page::default()
+        }
+    }
+
+    fn row(&self, (session, told): (&SessionRow, Vec<String>)) -> Item<Action> {
         let folder = session.folder.clone();
-        let title = when(&folder.file_name().unwrap_or_default().to_string_lossy());
-        let passed = session.passed.map(|passed| String::from(if passed { "passed" } else { "not passed" }));
-        let dice = session.dice.map(|dice| format!("Dice {dice:.2}"));
-        let plunge = session.plunge_mm.map(|mm| format!("plunge {mm:.1} mm"));
-        let known = [&session.person, &session.program, &session.case, &session.lesson].map(|text| printable(text));
-        let all = known.into_iter().chain([passed, dice, plunge].into_iter().flatten());
-        let line: Vec<String> = all.filter(|text| !text.is_empty()).collect();
+        let compare = Action::Compare(folder.clone());
+        let compare = match &self.first {
+            Some(first) if *first == folder => Item::main("Compare", "chosen: choose another one, too", compare),
+            Some(_) => Item::button("Compare", "with the chosen one, in the browser", compare),
+            None => Item::button("Compare", "then choose another one", compare),
+        };
         Item::Row(vec![
-            Item::button(title, "its result", Action::Result(folder.clone())),
+            Item::button(told[0].clone(), "its result", Action::Result(folder.clone())),
             Item::button("Report", "in the browser", Action::Report(folder.clone())),
             Item::button("Replay", "shows it again", Action::Replay(folder)),
-            Item::Note(line.join(", ")),
+            compare,
+            Item::Note(told[1..].join(", ")),
         ])
-    };
-    let kept = sessions::rows(kept, lessons, recent);
-    let rows: Vec<_> = kept.iter().map(row).collect();
-    let none = rows.is_empty().then(|| Item::Text("No session was kept yet.".into()));
-    Page {
-        title: "Sessions".into(),
-        line: format!("{}, the newest first; none is ever overwritten", count(kept.len(), "session")),
-        columns: vec![rows.into_iter().chain(none).collect()],
-        foot: vec![home()],
-        escape: Some(Action::Home),
-        ..Page::default()
     }
+}
+
+/// What is told of a session; date, time and name first.
+fn told(session: &SessionRow) -> Vec<String> {
+    let title = when(&session.folder.file_name().unwrap_or_default().to_string_lossy());
+    let passed = session.passed.map(|passed| String::from(if passed { "passed" } else { "not passed" }));
+    let dice = session.dice.map(|dice| format!("Dice {dice:.2}"));
+    let plunge = session.plunge_mm.map(|mm| format!("plunge {mm:.1} mm"));
+    let known = [&session.person, &session.program, &session.case, &session.lesson].map(|text| printable(text));
+    let all = [title].into_iter().chain(known).chain([passed, dice, plunge].into_iter().flatten());
+    all.filter(|text| !text.is_empty()).collect()
 }
 
 fn tried(times: usize) -> String {
@@ -151,5 +199,35 @@ pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: O
         foot: vec![Item::button("Back to the start page", "your choices are kept", Action::Home)],
         escape: Some(Action::Home),
         ..Page::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(page: &Page<Action>) -> String {
+        format!("{:?}", page.columns)
+    }
+
+    #[test]
+    fn sessions_are_found_by_words_and_compared_by_two_presses() {
+        let row = |name: &str, person: &str, passed| SessionRow {
+            folder: PathBuf::from(name),
+            person: person.into(),
+            passed: Some(passed),
+            ..SessionRow::default()
+        };
+        let rows = vec![row("2026-03-06T10-20-30", "Ada", true), row("2026-03-07T10-20-30", "Grace", false)];
+        let mut all = Sessions { rows, only: String::new(), first: None };
+        assert!(texts(&all.page()).contains("Ada") && texts(&all.page()).contains("Grace"));
+        all.only = "03-07 grace".into();
+        assert!(!texts(&all.page()).contains("Ada") && texts(&all.page()).contains("Grace"));
+        all.only = "nobody".into();
+        assert!(texts(&all.page()).contains("No session has all of these words"));
+        let [one, two] = ["a", "b"].map(PathBuf::from);
+        assert_eq!((all.compares(one.clone()), all.compares(one.clone())), (None, None), "a second press lets go");
+        assert_eq!((all.compares(one.clone()), all.compares(two.clone())), (None, Some([one, two])));
+        assert_eq!(all.first, None);
     }
 }

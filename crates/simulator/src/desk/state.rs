@@ -5,6 +5,7 @@ use crate::batch;
 use crate::case::Case;
 use crate::case::cache::Cache;
 use crate::case::choice::case_to_check;
+use crate::compare::compare;
 use crate::desk::action::Action;
 use crate::desk::browse::{self, Folder, Goal};
 use crate::desk::check::Check;
@@ -13,7 +14,7 @@ use crate::desk::form::Form;
 use crate::desk::job::{Done, Job, Work};
 use crate::desk::pages;
 use crate::desk::pictures::Pictures;
-use crate::desk::results;
+use crate::desk::results::{self, Sessions};
 use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
@@ -36,6 +37,8 @@ enum View {
     Start,
     /// A folder in which something is looked for.
     Browse(Goal, Folder, String),
+    /// The sessions that were kept.
+    Sessions(Box<Sessions>),
     /// A page that does not change.
     Page(Box<Page<Action>>),
     /// A case in pictures, and why the last click did nothing.
@@ -66,8 +69,8 @@ pub(crate) struct Desk {
     /// Dropped files and folders that still need a purpose.
     waiting: Vec<PathBuf>,
     devices: Receiver<Vec<Listed>>,
-    /// Files that the desktop could not open.
-    failed: (Sender<PathBuf>, Receiver<PathBuf>),
+    /// Pages on what failed beside the window.
+    failed: (Sender<Page<Action>>, Receiver<Page<Action>>),
     stop: Stop,
     pictures: Pictures,
 }
@@ -301,8 +304,8 @@ impl Host for Desk {
 
     fn shown(&mut self, guest: bool) -> Shown<Action> {
         self.form.devices.extend(self.devices.try_iter().flatten());
-        if let Some(path) = self.failed.1.try_iter().last() {
-            self.view = View::Page(Box::new(pages::unopened(&path)));
+        if let Some(page) = self.failed.1.try_iter().last() {
+            self.view = View::Page(Box::new(page));
         }
         if self.stop.asked() && !matches!(self.view, View::Session(..)) {
             return Shown::Nothing;
@@ -319,6 +322,7 @@ impl Host for Desk {
                 Shown::Page(Box::new(pages::start(self.program, &self.form, self.pictures.of(&self.form.case))))
             }
             View::Browse(goal, folder, written) => Shown::Page(Box::new(pages::browse(*goal, folder, written))),
+            View::Sessions(sessions) => Shown::Page(Box::new(sessions.page())),
             View::Page(page) => Shown::Page(page.clone()),
             View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault, &self.form))),
             View::Session(job, name) => match (job.is_running(), guest) {
@@ -495,7 +499,20 @@ impl Desk {
             Action::OpenAt(_) | Action::Drag(_) | Action::Draw(_) | Action::RoundFlap => self.look(action),
             Action::Blend(_) | Action::Slide(..) | Action::Cross(..) | Action::Turn(..) => self.look(action),
             Action::Sessions => {
-                self.view = View::Page(Box::new(results::list(&self.kept(), &lessons(), &self.form.settings.recent)))
+                let sessions = Sessions::of(&self.kept(), &lessons(), &self.form.settings.recent);
+                self.view = View::Sessions(Box::new(sessions));
+            }
+            Action::Only(words) => {
+                if let View::Sessions(sessions) = &mut self.view {
+                    sessions.only = words;
+                }
+            }
+            Action::Compare(folder) => {
+                if let View::Sessions(sessions) = &mut self.view
+                    && let Some(both) = sessions.compares(folder)
+                {
+                    self.compare(both);
+                }
             }
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
@@ -526,17 +543,35 @@ impl Desk {
     fn open(&self, path: &Path) {
         let (path, failed) = (path.to_owned(), self.failed.0.clone());
         // The desktop may take its time to find out that it cannot.
+        std::thread::spawn(move || open(&path, &failed));
+    }
+
+    /// Compares two sessions on a page of its own folder, and opens it.
+    fn compare(&self, [first, second]: [PathBuf; 2]) {
+        let name = |folder: &Path| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let out = sessions().join("comparisons").join(format!("{}-with-{}", name(&first), name(&second)));
+        let (source, failed) = (self.form.case.source.clone(), self.failed.0.clone());
+        // A minute of a recording takes a second.
         std::thread::spawn(move || {
-            let mut command = Command::new(OPENER);
-            let quiet = command.arg(&path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-            let fault = match quiet.status() {
-                Ok(status) if status.success() => return,
-                Ok(status) => format!("{OPENER} ended with {status}"),
-                Err(fault) => format!("{OPENER}: {fault}"),
-            };
-            tracing::warn!("{fault}; open {} by hand", path.display());
-            // Nobody listens once the window is closed.
-            _ = failed.send(path);
+            let [first, second] = [first, second].map(|folder| folder.join("session.mcap"));
+            match compare([&first, &second], &out) {
+                Ok(page) => open(&page, &failed),
+                Err(fault) => _ = failed.send(pages::fault(&fault, &source)),
+            }
         });
     }
+}
+
+/// Opens a file as the desktop does, and waits for it.
+fn open(path: &Path, failed: &Sender<Page<Action>>) {
+    let mut command = Command::new(OPENER);
+    let quiet = command.arg(path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let fault = match quiet.status() {
+        Ok(status) if status.success() => return,
+        Ok(status) => format!("{OPENER} ended with {status}"),
+        Err(fault) => format!("{OPENER}: {fault}"),
+    };
+    tracing::warn!("{fault}; open {} by hand", path.display());
+    // Nobody listens once the window is closed.
+    _ = failed.send(pages::unopened(path));
 }
