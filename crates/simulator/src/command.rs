@@ -42,6 +42,7 @@ const LOGGED: &str = "warn,winit=error,trepan_simulator=info";
 /// `built_in` is the case that is used if no image is given.
 pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     guard_files();
+    return_freed_memory();
     let options = match Options::of_program(program, std::env::args_os()) {
         Ok(options) => options,
         // clap prints control characters of an argument unescaped.
@@ -251,6 +252,18 @@ fn guard_files() {
 
 #[cfg(not(unix))]
 fn guard_files() {}
+
+/// Returns freed blocks of 8 MiB and more to the system at once. By itself glibc raises that size to
+/// the largest block that was ever freed, and keeps what lies between others.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[expect(unsafe_code, reason = "the C library offers it only so")]
+fn return_freed_memory() {
+    // SAFETY: it takes two numbers and sets one of the allocator's, before any other thread begins.
+    unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, 8 << 20) };
+}
+
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+fn return_freed_memory() {}
 
 #[cfg(test)]
 mod tests {
