@@ -253,8 +253,8 @@ fn guard_files() {
 #[cfg(not(unix))]
 fn guard_files() {}
 
-/// Returns freed blocks of 8 MiB and more to the system at once. By itself glibc raises that size to
-/// the largest block that was ever freed, and keeps what lies between others.
+/// Returns freed blocks of 8 MiB and more to the system at once. By itself glibc raises that size
+/// to the largest block that was ever freed, and keeps what lies between others.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "the C library offers it only so")]
 fn return_freed_memory() {

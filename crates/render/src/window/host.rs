@@ -104,8 +104,8 @@ impl Offers {
     }
 }
 
-/// Time between two looks at what has changed, with a card and without: a picture of a page takes
-/// processors about 90 ms, which an import beside it needs.
+/// Time between two looks at what has changed, with a card and without. A picture of a page takes a
+/// processor 70 to 90 ms, which an import beside it needs.
 const POLL: [Duration; 2] = [Duration::from_millis(100), Duration::from_millis(500)];
 
 /// Type of the session and the painter in the window.
