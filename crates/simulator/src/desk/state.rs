@@ -452,6 +452,21 @@ impl Desk {
         done.err().into_iter().for_each(|fault| self.fail(fault));
     }
 
+    /// Does what is done with the sessions that were kept.
+    fn list(&mut self, action: Action) {
+        match (action, &mut self.view) {
+            (Action::Only(words), View::Sessions(sessions)) => sessions.only = words,
+            (Action::Compare(folder), View::Sessions(sessions)) => {
+                let both = sessions.compares(folder);
+                both.into_iter().for_each(|both| self.compare(both));
+            }
+            _ => {
+                let sessions = Sessions::of(&self.kept(), &lessons(), &self.form.settings.recent);
+                self.view = View::Sessions(Box::new(sessions));
+            }
+        }
+    }
+
     /// Does what leads to another page.
     fn leave(&mut self, action: Action) {
         match action {
@@ -498,22 +513,7 @@ impl Desk {
             Action::Check => self.check(),
             Action::OpenAt(_) | Action::Drag(_) | Action::Draw(_) | Action::RoundFlap => self.look(action),
             Action::Blend(_) | Action::Slide(..) | Action::Cross(..) | Action::Turn(..) => self.look(action),
-            Action::Sessions => {
-                let sessions = Sessions::of(&self.kept(), &lessons(), &self.form.settings.recent);
-                self.view = View::Sessions(Box::new(sessions));
-            }
-            Action::Only(words) => {
-                if let View::Sessions(sessions) = &mut self.view {
-                    sessions.only = words;
-                }
-            }
-            Action::Compare(folder) => {
-                if let View::Sessions(sessions) = &mut self.view
-                    && let Some(both) = sessions.compares(folder)
-                {
-                    self.compare(both);
-                }
-            }
+            Action::Sessions | Action::Only(_) | Action::Compare(_) => self.list(action),
             Action::Result(folder) => {
                 self.view = View::Page(Box::new(results::page(&folder, &self.kept(), &lessons())))
             }
