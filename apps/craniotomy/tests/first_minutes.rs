@@ -228,6 +228,7 @@ fn nothing_that_a_person_does_by_accident_cuts_or_ends() {
     let summary = person.ends(1);
     assert_eq!(summary["bone_removed_mm3"].as_f64(), Some(0.0));
     person.waits_for("the result", || person.main_button().is_some());
+    person.rests(1.0);
     let [x, y] = person.main_button().unwrap();
     person.clicks([x - 20 + TO_REPLAY, y]);
     person.waits_for("the replay", || person.main_button().is_none());

@@ -224,7 +224,12 @@ impl<H: Host> Pages<H> {
                 });
                 if let Some(mut shown) = guest.take() {
                     shown.window.show(ui, state);
-                    if shown.window.is_over() { shown.leave() } else { *guest = Some(shown) }
+                    if shown.window.is_over() {
+                        shown.leave();
+                        ui.request_repaint();
+                    } else {
+                        *guest = Some(shown);
+                    }
                 }
                 ui.request_repaint_after(poll);
                 strip.unwrap_or_default()

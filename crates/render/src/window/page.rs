@@ -215,7 +215,7 @@ pub(crate) fn show<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut T
     let area = ui.available_rect_before_wrap();
     let widest = WIDEST[page.columns.len().clamp(1, WIDEST.len()) - 1];
     let middle = area.shrink2(egui::vec2((0.5 * (area.width() - widest)).max(0.0), 0.0));
-    // Its height is known from the picture before.
+    // Its height is known from the pass before.
     let key = egui::Id::unique(("page", &page.title));
     let spare = area.height() - ui.data(|data| data.get_temp::<f32>(key)).unwrap_or(area.height());
     let floats = spare > 0.0 && !page.steady;
@@ -228,6 +228,8 @@ pub(crate) fn show<A: Clone>(ui: &mut egui::Ui, page: &Page<A>, textures: &mut T
     let (done, height) = drawn.inner;
     if ui.data(|data| data.get_temp(key)) != Some(height) {
         ui.data_mut(|data| data.insert_temp(key, height));
+        // Nobody sees it at the wrong height.
+        ui.ctx().request_discard("the height of the page");
         ui.request_repaint();
     }
     done
