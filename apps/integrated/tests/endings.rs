@@ -11,8 +11,8 @@ use trepan_link::Recording;
 fn operation(out: &Path, seconds: &str, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
     command.args(["--headless", "--frames-per-second", "0", "--duration", seconds, "--out"]).arg(out);
-    // A plan depends on the machine; a replay uses the models of its recording.
-    let again = more.iter().any(|word| word.starts_with("replay:"));
+    // A plan depends on the machine; a replay and a watcher use the models of its recording.
+    let again = more.iter().any(|word| word.starts_with("replay:") || *word == "--watch");
     command.args(["--quality", "usual"].iter().filter(|_| !again)).args(more);
     command
         .env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"))
@@ -138,7 +138,8 @@ fn a_built_case_runs_and_is_not_overwritten() {
 fn a_watcher_follows_and_killing_one_has_no_effect() {
     let name = format!("test-{}", std::process::id());
     let [trainee, watcher, dead] = [(); 3].map(|()| tempfile::tempdir().unwrap());
-    let mut session = operation(trainee.path(), "8", &["--share", &name]).spawn().unwrap();
+    let own = ["--share", &name, "--tets", "4000", "--flap", "25", "--set", "friction=0.2"];
+    let mut session = operation(trainee.path(), "8", &own).spawn().unwrap();
     let mut killed = operation(dead.path(), "60", &["--watch", &name]).spawn().unwrap();
     let following = operation(watcher.path(), "60", &["--watch", &name]).spawn().unwrap();
     std::thread::sleep(Duration::from_secs(4));
@@ -151,6 +152,11 @@ fn a_watcher_follows_and_killing_one_has_no_effect() {
     assert!(probing(&was) && probing(&seen), "the watcher did not follow to the last phase");
     let summary: Value = serde_json::from_slice(&fs::read(watcher.path().join("summary.json")).unwrap()).unwrap();
     assert!(summary["remarks"].to_string().contains(&format!("session {name} has ended")), "{}", summary["remarks"]);
+    let [was, seen] = [was, seen].map(|recording| recording.header);
+    assert_eq!(was.hashes, seen.hashes, "the watcher runs the trainee's case");
+    for key in ["tets", "spacing_mm", "flap_mm", "friction", "solver_run", "method"] {
+        assert_eq!(was.config.get(key), seen.config.get(key), "{key} is the trainee's");
+    }
 }
 
 #[test]

@@ -6,13 +6,13 @@
 //! waits: a slow, stopped or dead subscriber loses old messages without affecting others.
 //!
 //! ```text
-//!   simulator ──"tick", "event"──> watcher
-//!             <──"teacher"─────────
+//!   simulator ──"header", "tick", "event"──> watcher
+//!             <──"teacher"──────────────────
 //! ```
 //!
 //! # Practice
-//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`]; publishing one
-//! costs a few µs. Publish from the recorder's thread, not from a haptic tick.
+//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`], a header 64 KiB;
+//! publishing one costs a few µs. Publish from the recorder's thread, not from a haptic tick.
 //! [`Subscriber::newest`] has no age: a dead publisher looks like a silent one, so compare the
 //! sequence numbers with the clock. Leftovers of a killed process are removed when the next one
 //! joins. Signal handlers are not changed.
@@ -25,7 +25,7 @@
 //! use iceoryx2's tunnel.
 
 use crate::protobuf::{decode, encode};
-use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TeacherRecord, TickRecord};
 use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::port::subscriber::Subscriber as SubscriberPort;
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -36,8 +36,8 @@ use std::time::SystemTime;
 
 /// Longest message, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 4096;
-/// Messages that a subscriber may lag before it loses the oldest.
-const BUFFER: usize = 256;
+/// Longest header, bytes: a drawn flap has hundreds of points.
+const MAX_HEADER_BYTES: usize = 65536;
 /// Most simulators and watchers that share a topic.
 const MAX_MEMBERS: usize = 16;
 
@@ -47,6 +47,10 @@ type Service = ipc_threadsafe::Service;
 pub trait Topic: sealed::Sealed {
     /// Name of its topic within a session.
     const TOPIC: &'static str;
+    /// Its longest message, bytes.
+    const MAX_BYTES: usize;
+    /// Messages that a subscriber may lag before it loses the oldest.
+    const BUFFER: usize;
 }
 
 mod sealed {
@@ -54,22 +58,25 @@ mod sealed {
 }
 
 macro_rules! topics {
-    ($($record:ty = $topic:literal),*) => {
+    ($($record:ty = $topic:literal, $bytes:expr, $buffer:expr;)*) => {
         $(
             impl sealed::Sealed for $record {}
             impl Topic for $record {
                 const TOPIC: &'static str = $topic;
+                const MAX_BYTES: usize = $bytes;
+                const BUFFER: usize = $buffer;
             }
         )*
     };
 }
 
 topics!(
-    TickRecord = "tick",
-    CollisionRecord = "collision",
-    SolverRecord = "solver",
-    EventRecord = "event",
-    TeacherRecord = "teacher"
+    TickRecord = "tick", MAX_MESSAGE_BYTES, 256;
+    CollisionRecord = "collision", MAX_MESSAGE_BYTES, 256;
+    SolverRecord = "solver", MAX_MESSAGE_BYTES, 256;
+    EventRecord = "event", MAX_MESSAGE_BYTES, 256;
+    TeacherRecord = "teacher", MAX_MESSAGE_BYTES, 256;
+    SessionHeader = "header", MAX_HEADER_BYTES, 1;
 );
 
 /// A topic could not be used.
@@ -92,10 +99,12 @@ pub enum TopicError {
         reason: String,
     },
     /// A message is too long.
-    #[error("a message of {bytes} bytes is too long for topic {topic}; the limit is {MAX_MESSAGE_BYTES}")]
+    #[error("a message of {bytes} bytes is too long for topic {topic}; the limit is {limit}")]
     TooLong {
         /// Its length.
         bytes: usize,
+        /// The topic's limit, bytes.
+        limit: usize,
         /// The topic.
         topic: &'static str,
     },
@@ -139,7 +148,7 @@ impl Session {
 
     /// Creates a publisher of `T`.
     pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, TopicError> {
-        let port = self.topic::<T>()?.publisher_builder().initial_max_slice_len(MAX_MESSAGE_BYTES).create();
+        let port = self.topic::<T>()?.publisher_builder().initial_max_slice_len(T::MAX_BYTES).create();
         let port = port.map_err(|error| failed("publish", &self.name, &error))?;
         Ok(Publisher { port, bytes: Vec::with_capacity(512), session: self.name.clone(), record: PhantomData })
     }
@@ -161,7 +170,7 @@ impl Session {
             .user_header::<u64>()
             .enable_safe_overflow(true)
             .history_size(1)
-            .subscriber_max_buffer_size(BUFFER)
+            .subscriber_max_buffer_size(T::BUFFER)
             .max_publishers(MAX_MEMBERS)
             .max_subscribers(MAX_MEMBERS)
             .max_nodes(2 * MAX_MEMBERS)
@@ -175,8 +184,8 @@ impl<T: Topic> Publisher<T> {
     pub fn send(&mut self, record: &T) -> Result<(), TopicError> {
         self.bytes.clear();
         encode(record, &mut self.bytes);
-        if self.bytes.len() > MAX_MESSAGE_BYTES {
-            return Err(TopicError::TooLong { bytes: self.bytes.len(), topic: T::TOPIC });
+        if self.bytes.len() > T::MAX_BYTES {
+            return Err(TopicError::TooLong { bytes: self.bytes.len(), limit: T::MAX_BYTES, topic: T::TOPIC });
         }
         let failed = |error: &dyn std::fmt::Debug| failed("publish", &self.session, error);
         let mut sample = self.port.loan_slice_uninit(self.bytes.len()).map_err(|error| failed(&error))?;
@@ -214,7 +223,7 @@ impl<T: Topic> Subscriber<T> {
     /// call.
     pub fn newest(&mut self) -> Result<Option<T>, TopicError> {
         let mut newest: Option<(u64, T)> = None;
-        for _ in 0..MAX_MEMBERS * (BUFFER + 1) {
+        for _ in 0..MAX_MEMBERS * (T::BUFFER + 1) {
             match self.receive_sent()? {
                 Some(sent) if newest.as_ref().is_none_or(|newest| sent.0 >= newest.0) => newest = Some(sent),
                 Some(_) => {}

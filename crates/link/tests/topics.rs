@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_link::topics::{MAX_MESSAGE_BYTES, Session, TopicError};
-use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
+use trepan_link::wire::{EventRecord, SessionHeader, TeacherRecord, TickRecord};
 
 const ROLE: &str = "TREPAN_TEST_ROLE";
 
@@ -160,4 +160,20 @@ fn the_newest_of_two_publishers_is_the_one_sent_last() {
     }
     assert_eq!(watcher.newest().unwrap().map(|t| t.tick), Some(599));
     assert!(watcher.newest().unwrap().is_none(), "all messages of both are taken");
+}
+
+#[test]
+fn who_joins_late_gets_the_header_as_it_was_written() {
+    let session = Session::join(&session_name("header")).unwrap();
+    let mut publisher = session.publisher::<SessionHeader>().unwrap();
+    let line = "-12.345678 3.25 80.125,".repeat(1000);
+    let config = [("flap_line".to_string(), line), ("tets".into(), "12000".into())].into();
+    let header = SessionHeader { app: "integrated".into(), config, ..SessionHeader::default() };
+    publisher.send(&header).unwrap();
+    let mut late = session.subscriber::<SessionHeader>().unwrap();
+    let received = wait_for(|| {
+        publisher.greet().unwrap();
+        late.newest().unwrap()
+    });
+    assert_eq!(received, header);
 }

@@ -70,11 +70,11 @@ impl Operation {
                 .or_else(|| within("young_modulus_kpa", MODULI_KPA))
                 .unwrap_or(YOUNG_KPA),
             rate_hz: options.rate_hz.or_else(|| within("rate_hz", RATES_HZ)).unwrap_or(RATE_HZ),
-            opening_needed: recorded("opening_needed").map_or(options.watch.is_none(), |needed| needed != "false"),
-            force_waits: match recording {
-                Some(_) => recorded("force_waits").is_some_and(|waits| waits == "true"),
-                None => options.watch.is_none(),
-            },
+            // A watcher does not see the bone that was drilled before it joined.
+            opening_needed: options.watch.is_none()
+                && recorded("opening_needed").is_none_or(|needed| needed != "false"),
+            force_waits: options.watch.is_none()
+                && recording.is_none_or(|_| recorded("force_waits").is_some_and(|waits| waits == "true")),
         }
     }
 

@@ -26,7 +26,7 @@ use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
-use crate::run::watch::{Asked, Company, Share};
+use crate::run::watch::{self, Asked, Company, Share};
 use crate::run::{Outcome, RenderInputs, Run, Stages, View};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
@@ -116,8 +116,13 @@ impl Session {
             Some(path) => Some(Arc::new(recordings::open(program, path, &choice::identity(&options, &built_in)?)?)),
             None => None,
         };
-        let operation = Operation::of(&options, &device, recording.as_deref());
-        let request = ModelRequest::of(program, &options, &operation, recording.as_deref())?;
+        let watched = match &options.watch {
+            Some(name) => Some(watch::header(program, name, &choice::identity(&options, &built_in)?, &place.progress)?),
+            None => None,
+        };
+        let settled = recording.as_deref().or(watched.as_ref());
+        let operation = Operation::of(&options, &device, settled);
+        let request = ModelRequest::of(program, &options, &operation, settled)?;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
             None => choice::inputs(&options.patient, built_in.clone()),
@@ -187,10 +192,11 @@ impl Session {
         let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let files = output::Files::make(&self.out, &record)?;
-        let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
+        let header = self.header(&limits, second_limits.as_ref());
+        let (share, asked) = self.options.share.as_deref().map(|name| Share::open(name, &header)).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
+        let date = output::now();
         let recorder = Recorder::create(&record, &header)?;
         let scene = match self.recording {
             None => Some((self.film(whole.clone(), None), SceneWriter::create(&output::scene_of(&record), &header)?)),

@@ -1,7 +1,7 @@
 //! The numbered fields of each record. A number is never reused for another field.
 
 use super::{Field, Fields, Value, Visit};
-use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TeacherRecord, TickRecord};
 use trepan_geometry::{Pose, Quat, Twist, Vec3, Wrench};
 
 /// Lists messages: the type, its name in files, the number and name of each field.
@@ -35,6 +35,20 @@ messages! {
     Pose = "Pose" { 1 translation, 2 rotation }
     Twist = "Twist" { 1 linear, 2 angular }
     Wrench = "Wrench" { 1 force, 2 torque }
+}
+
+/// One text, the JSON of a recording's metadata; bytes that are none leave the header as it is.
+impl Fields for SessionHeader {
+    const NAME: &'static str = "trepan.Header";
+
+    fn visit(&mut self, visit: &mut dyn Visit) {
+        // Serialising a struct of strings and maps of strings cannot fail.
+        let mut json = serde_json::to_string(self).unwrap_or_default();
+        json.visit_as(1, "json", visit);
+        if let Ok(header) = serde_json::from_str(&json) {
+            *self = header;
+        }
+    }
 }
 
 /// Implements [`Field`] for the types that are a value themselves.

@@ -184,7 +184,8 @@ impl Journal {
         now_ms: f64,
     ) -> Result<(), LinkError> {
         let Some(sharing) = share else { return Ok(()) };
-        // Events are rare: who joins late gets the newest one.
+        // Who joins late gets the header and the newest event.
+        _ = sharing.headers.greet();
         _ = sharing.events.greet();
         for (begins, text) in sharing.teacher.receive(now_ms) {
             let text = format!("{}: {text}", if begins { "begins" } else { "ends" });

@@ -8,14 +8,16 @@
 //! [lesson](super::lesson).
 //!
 //! ```text
-//!  trainee: recording thread ──tick, event──> shared memory ──> watcher: pump thread ─┐
+//!  trainee: before the first tick ──header──> shared memory ──> watcher: case, models
+//!           recording thread ──tick, event──>               ──> pump thread ──────────┐
 //!                            <────teacher────               <── watcher's window      │
 //!                                                               haptic loop <── cell <┘
 //! ```
 //!
 //! # Practice
 //! Sending and receiving cost the recording thread a few µs a tick; the haptic loop is not
-//! involved. Bone drilled before the watcher joined is not visible to it. Watching ends three
+//! involved. The watcher takes case, models and settings from the trainee's header: nothing is
+//! measured or chosen twice, and a prepared case comes from the cache. Bone drilled before the watcher joined is not visible to it. Watching ends three
 //! seconds after the last tick.
 //!
 //! # When not to use it
@@ -23,7 +25,10 @@
 //! (`iox2 tunnel zenoh`, of its command line tools) on both machines to forward the topics
 //! `trepan/NAME/...`; nothing changes here.
 
+use crate::case::identity::Identity;
 use crate::error::SessionError;
+use crate::program::Program;
+use crate::progress::Progress;
 use crate::run::clock::Clock;
 use crate::run::lesson::{Listener, Teacher};
 use crate::run::stop::Stop;
@@ -33,17 +38,17 @@ use std::time::Duration;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
+use trepan_link::Recording;
 use trepan_link::cell::{Reader, cell};
-use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
-use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
+use trepan_link::topics::{Publisher, Session, Subscriber, Topic, TopicError};
+use trepan_link::wire::{EventRecord, SessionHeader, TeacherRecord, TickRecord};
 
 /// Time without a new tick after which a reading is stale, ms.
 const STALE_MS: f64 = 100.0;
 /// Time without a new tick after which the other session counts as ended, ms.
 const ENDED_MS: f64 = 3000.0;
-/// Longest wait of a watcher for the first tick, s: the other session may still be reading its
-/// images.
-const FIRST_TICK_TIMEOUT_S: f64 = 20.0;
+/// Longest wait of a watcher for the other session, s: it may still be reading its images.
+const TIMEOUT_S: f64 = 40.0;
 /// Time between two polls of the shared memory.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
@@ -53,6 +58,8 @@ pub(crate) struct Share {
     pub(super) ticks: Publisher<TickRecord>,
     /// Publishes events.
     pub(super) events: Publisher<EventRecord>,
+    /// Publishes the header.
+    pub(super) headers: Publisher<SessionHeader>,
     /// Receives the teacher's requests.
     pub(super) teacher: Listener,
     _session: Session,
@@ -63,14 +70,13 @@ pub(crate) type Asked = [Reader<TeacherRecord>; 3];
 
 impl Share {
     /// Shares a session under a name; returns also the readers of the teacher's requests.
-    pub fn open(name: &str) -> Result<(Self, Asked), SessionError> {
+    pub fn open(name: &str, header: &SessionHeader) -> Result<(Self, Asked), SessionError> {
         let open = || -> Result<(Self, Asked), TopicError> {
             let session = Session::join(name)?;
             let (teacher, readers) = Listener::join(&session)?;
-            Ok((
-                Self { ticks: session.publisher()?, events: session.publisher()?, teacher, _session: session },
-                readers,
-            ))
+            let (ticks, events, mut headers) = (session.publisher()?, session.publisher()?, session.publisher()?);
+            headers.send(header)?;
+            Ok((Self { ticks, events, headers, teacher, _session: session }, readers))
         };
         open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
     }
@@ -101,20 +107,45 @@ impl Watching {
     }
 }
 
-/// Waits for the first tick and logs the wait.
-fn first_tick(name: &str, ticks: &mut Subscriber<TickRecord>, stop: &Stop) -> Result<TickRecord, SessionError> {
+/// Waits for the session of a name to send its header; returns a recording of nothing else.
+///
+/// An error where none of this name is there, or where it operates on another case.
+pub(crate) fn header(
+    program: Program,
+    name: &str,
+    case: &Identity,
+    progress: &Progress,
+) -> Result<Recording, SessionError> {
+    let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
+    let session = Session::join(name).map_err(fault)?;
+    let mut headers: Subscriber<SessionHeader> = session.subscriber().map_err(fault)?;
+    let header = first(name, &mut headers, || progress.is_over());
+    let header = if progress.is_over() { Err(SessionError::Cancelled) } else { header }?;
+    let watched = Identity::of(&header);
+    if watched.is(case) == Some(false) {
+        let (is, was, program) = (case.describe(), watched.describe(), program.name());
+        return Err(SessionError::Usage(format!(
+            "--watch {name}: that session operates on another case, {was}, this is {is}; give {program} the --ct and \
+             --mri, or the --case, of that one, or none of them for the built-in case"
+        )));
+    }
+    Ok(Recording { header, ..Recording::default() })
+}
+
+/// Waits for the first record of a topic, until it is `over`, and logs the wait.
+fn first<T: Topic>(name: &str, topic: &mut Subscriber<T>, over: impl Fn() -> bool) -> Result<T, SessionError> {
     let (clock, mut logged) = (Clock::start(), false);
-    while clock.now_ms() < 1e3 * FIRST_TICK_TIMEOUT_S && !stop.asked() {
-        if let Ok(Some(record)) = ticks.newest() {
+    while clock.now_ms() < 1e3 * TIMEOUT_S && !over() {
+        if let Ok(Some(record)) = topic.newest() {
             return Ok(record);
         }
         if !std::mem::replace(&mut logged, true) {
-            tracing::info!("waiting for the session {name}, at most {FIRST_TICK_TIMEOUT_S} s");
+            tracing::info!("waiting for the session {name}, at most {TIMEOUT_S} s");
         }
         std::thread::sleep(POLL_INTERVAL);
     }
     Err(SessionError::Usage(format!(
-        "--watch {name}: no session of this name sends ticks: start one on this machine with --share {name}, then watch it"
+        "--watch {name}: no session of this name is there: start one on this machine with --share {name}, then watch it"
     )))
 }
 
@@ -125,7 +156,7 @@ impl Watched {
         let session = Session::join(name).map_err(fault)?;
         let mut ticks: Subscriber<TickRecord> = session.subscriber().map_err(fault)?;
         let (mut writer, newest) = cell(TickRecord::default());
-        writer.set(first_tick(name, &mut ticks, stop)?);
+        writer.set(first(name, &mut ticks, || stop.asked())?);
         let open = Arc::new(AtomicBool::new(true));
         let watching = Watching { name: name.into(), over: Arc::default() };
         let over = Arc::clone(&watching.over);
