@@ -163,6 +163,8 @@ pub struct SolverRecord {
     pub inverted: u32,
     /// Computation time of the step, µs.
     pub compute_us: f32,
+    /// 1 from the first step of a cheaper solver on, else 0.
+    pub cheaper: u32,
 }
 
 /// A single event: a warning, a phase change, a device fault.

@@ -59,7 +59,7 @@ pub use method::{Descriptor, Method};
 pub use mixture::Bound;
 pub use operator::Stiffness;
 pub use pressure::SurfacePressure;
-pub use solver::{Loads, NodeState, SoftSolver, StepReport};
+pub use solver::{Loads, MakeSolver, NodeState, SoftSolver, StepReport};
 pub use stiffening::{STIFFENING_POWER, Stiffening};
 pub use tangent::Tangent;
 pub use tetra::Shape;

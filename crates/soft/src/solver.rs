@@ -39,7 +39,25 @@ pub trait SoftSolver: Send {
     fn next_dt_ms(&self) -> f32 {
         self.stable_dt_ms()
     }
+
+    /// Maker of a solver of the same body that costs less per simulated time and errs more in
+    /// motion, for a processor that is too slow; `None` where there is none.
+    fn cheaper(&self) -> Option<MakeSolver> {
+        None
+    }
+
+    /// Stress memory, in an order of its own; empty without one.
+    fn memory(&self) -> Vec<f32> {
+        Vec::new()
+    }
+
+    /// Goes on from the state and the stress memory of the solver that [`cheaper`](Self::cheaper)
+    /// came from. A solver that nobody calls cheaper does nothing.
+    fn resume(&mut self, _state: &NodeState, _memory: &[f32]) {}
 }
+
+/// Makes a solver on any thread; `None` if the body is refused.
+pub type MakeSolver = Box<dyn FnOnce() -> Option<Box<dyn SoftSolver>> + Send>;
 
 /// What a solver publishes of its nodes.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -131,6 +131,16 @@ impl Elements {
     pub fn forget(&mut self) {
         self.team.forget();
     }
+
+    /// The stress memory, part by part.
+    pub fn memory(&self) -> Vec<f32> {
+        self.team.memory()
+    }
+
+    /// Takes a stress memory of [`memory`](Self::memory); clears it for one of another length.
+    pub fn remember(&mut self, memory: &[f32]) {
+        self.team.remember(memory);
+    }
 }
 
 fn sorted(values: impl Iterator<Item = u32>) -> Vec<u32> {

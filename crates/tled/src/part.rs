@@ -97,7 +97,8 @@ trait LawElements: Send {
         out: (&mut [Quad; NODES], &mut Vec<(u32, f32)>),
     ) -> PassReport;
     fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]);
-    fn forget(&mut self);
+    /// The stress memory.
+    fn memory(&mut self) -> &mut [f32];
 }
 
 struct Blocks<M, const K: usize, const T: usize> {
@@ -217,9 +218,14 @@ impl Part {
         self.u.iter_mut().zip(&self.groups.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
     }
 
+    /// The stress memory.
+    pub fn memory(&mut self) -> &mut [f32] {
+        self.elements.memory()
+    }
+
     /// Clears the stress memory.
     pub fn forget(&mut self) {
-        self.elements.forget();
+        self.memory().fill(0.0);
         self.wake();
     }
 }
@@ -296,7 +302,7 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
         kernel.run(&mut Volumes { blocks: &self.blocks, u, strains: &mut self.strains, shares });
     }
 
-    fn forget(&mut self) {
-        self.memory.fill([[[0.0; WIDTH]; 6]; T]);
+    fn memory(&mut self) -> &mut [f32] {
+        self.memory.as_flattened_mut().as_flattened_mut().as_flattened_mut()
     }
 }

@@ -173,6 +173,25 @@ impl Team {
     pub fn forget(&mut self) {
         self.shared.parts.iter().for_each(|part| lock(part).forget());
     }
+
+    /// The stress memory, part by part.
+    pub fn memory(&self) -> Vec<f32> {
+        self.shared.parts.iter().flat_map(|part| lock(part).memory().to_vec()).collect()
+    }
+
+    /// Takes a stress memory of [`memory`](Self::memory); clears it for one of another length.
+    pub fn remember(&mut self, memory: &[f32]) {
+        if memory.len() != self.shared.parts.iter().map(|part| lock(part).memory().len()).sum() {
+            return self.forget();
+        }
+        let mut rest = memory;
+        for part in &self.shared.parts {
+            let mut part = lock(part);
+            let (own, others) = rest.split_at(part.memory().len());
+            part.memory().copy_from_slice(own);
+            rest = others;
+        }
+    }
 }
 
 impl Drop for Team {

@@ -12,6 +12,7 @@ use crate::run::clock::Clock;
 use crate::run::watch::Share;
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
+use crate::stages::solver_step::cheaper_text;
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
@@ -49,6 +50,8 @@ pub(crate) struct Journal {
     solver: Receiver<SolverRecord>,
     /// Number and time, ms, of the newest tick.
     newest: (u64, f64),
+    /// Whether a cheaper solver was met.
+    is_cheaper: bool,
     /// Newtons at the hand per newton of the task, on bone.
     force_scale: ForceScale,
 }
@@ -94,6 +97,7 @@ pub(crate) fn journal(force_scale: ForceScale) -> (JournalSenders, Journal) {
             collisions: collisions.1,
             solver: solver.1,
             newest,
+            is_cheaper: false,
             force_scale,
         },
     )
@@ -164,6 +168,12 @@ impl Journal {
         }
         while let Some(record) = self.solver.receive() {
             recorder.solver(&record)?;
+            if record.cheaper > 0 && !std::mem::replace(&mut self.is_cheaper, true) {
+                let (tick, time_ms) = self.newest;
+                let text = cheaper_text(record.time_ms);
+                tracing::warn!("{:7.3} s  {text}", 1e-3 * time_ms);
+                recorder.event(&EventRecord { tick, time_ms, kind: "solver".into(), text })?;
+            }
         }
         while let Some(notice) = self.notices.receive() {
             written.notices.push(notice);

@@ -17,6 +17,7 @@ use crate::run::clock::{Clock, Schedule};
 use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
 use crate::run::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
+use crate::stages::alarms;
 use crate::stages::haptic_tick::{HapticStage, Tick, TickInput};
 use crate::stages::second_hand::{SecondHand, SecondView};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
@@ -32,6 +33,9 @@ use trepan_soft::Loads;
 
 /// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;
+/// Time for which the pace of a second has been too slow before a cheaper solver is asked for, ms:
+/// a second slow second.
+const SLOW_MS: f64 = 1000.0;
 /// Largest number of ticks for the force to fade at the end.
 const FADE_TICKS: u64 = 200;
 
@@ -98,14 +102,21 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
     times
 }
 
-/// The solver loop: simulated time follows wall time; a lag over [`LAG_MS`] is skipped.
+/// The solver loop: simulated time follows wall time; a lag over [`LAG_MS`] is skipped. After two
+/// slow seconds a cheaper solver goes on.
 fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop: &Stop) -> SolverOutcome {
     let _ = real_time(40, "simulation");
     let mut times = Times::default();
     let begin_ms = clock.now_ms();
     let mut skipped_ms = 0.0;
+    let (mut pace, mut slow_from_ms) = (alarms::Pace::UNKNOWN, None);
     while !stop.asked() {
         let began_ms = clock.now_ms();
+        if pace.follow(began_ms, stage.time_ms()) >= alarms::REAL_TIME {
+            slow_from_ms = None;
+        } else if began_ms - *slow_from_ms.get_or_insert(began_ms) >= SLOW_MS {
+            stage.ask_for_cheaper();
+        }
         let behind_ms = began_ms - begin_ms - skipped_ms - stage.time_ms();
         if behind_ms < f64::from(stage.dt_ms()) {
             clock.sleep_until(began_ms + f64::from(stage.dt_ms()) - behind_ms);

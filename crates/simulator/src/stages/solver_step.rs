@@ -5,10 +5,14 @@
 //! between two collision results remain stable. They move on with the tool, at its velocity: a
 //! contact that waits for the next result is found up to a step too deep, and gives the hand 0.04 N
 //! too much at 40 mm/s. A record is made when a new contact takes effect,
-//! and every [`EACH`] steps: as much as a replay needs.
+//! and every [`EACH`] steps: as much as a replay needs. Where the processor is too slow, a cheaper
+//! solver of the same body goes on from the same state; the record of its first step says so, and
+//! a replay changes at the same step.
 
 use crate::stages::collision_step::SoftFrame;
 use serde::Serialize;
+use std::thread::JoinHandle;
+use std::time::Duration;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;
@@ -33,6 +37,7 @@ impl SolverStage {
             (self.contact_seq, self.followed_ms) = (contact_seq, 0.0);
             self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
         }
+        let changed = self.takes_cheaper();
         let dt_ms = self.dt_ms();
         let report = self.solver.step(&self.loads, dt_ms);
         self.steps += 1;
@@ -47,7 +52,7 @@ impl SolverStage {
         } else if self.time_ms() - self.touched_ms > MOVES_BACK_MS {
             self.solver_faults.rest(self.fastest() * dt_ms);
         }
-        (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
+        (switched || changed || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
     }
 
     /// Returns the speed of the fastest node, mm/ms.
@@ -65,7 +70,33 @@ impl SolverStage {
             max_displacement_mm: now_mm,
             inverted,
             compute_us: 0.0,
+            cheaper: self.solver_faults.cheaper_from_ms.is_some().into(),
         }
+    }
+
+    /// Has a cheaper solver made, once, on a thread of its own; it steps from when it is there.
+    pub fn ask_for_cheaper(&mut self) {
+        if !std::mem::replace(&mut self.asked, true) {
+            self.coming = self.solver.cheaper().map(std::thread::spawn);
+        }
+    }
+
+    /// The same, and waits until it is there: for a replay.
+    pub fn wait_for_cheaper(&mut self) {
+        self.ask_for_cheaper();
+        while self.coming.as_ref().is_some_and(|coming| !coming.is_finished()) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Lets the cheaper solver go on once it is made; returns whether it does from this step on.
+    fn takes_cheaper(&mut self) -> bool {
+        let Some(coming) = self.coming.take_if(|coming| coming.is_finished()) else { return false };
+        let Ok(Some(mut solver)) = coming.join() else { return false };
+        solver.resume(self.solver.state(), &self.solver.memory());
+        self.solver = solver;
+        self.solver_faults.cheaper_from_ms = Some(self.time_ms);
+        true
     }
 }
 
@@ -84,6 +115,18 @@ pub struct SolverStage {
     max_displacement_mm: f32,
     /// Simulated time of the last touch of the brain, ms.
     touched_ms: f64,
+    /// Whether a cheaper solver was asked for, and where it is made.
+    asked: bool,
+    coming: Option<JoinHandle<Option<Box<dyn SoftSolver>>>>,
+}
+
+/// Says that a cheaper solver steps from some simulated time on, ms.
+pub(crate) fn cheaper_text(from_ms: f64) -> String {
+    format!(
+        "the processor was too slow for the brain: from {:.1} s on its solver took longer steps, and a fast press \
+         feels up to 0.03 N heavier; close programs, or take a lower quality",
+        1e-3 * from_ms
+    )
 }
 
 /// Faults of a solver, summed over steps.
@@ -103,6 +146,9 @@ pub struct SolverFaults {
     pub rest_motion_mm: f32,
     /// Steps in which that motion exceeded 0.02 mm.
     pub restless_steps: u64,
+    /// Simulated time from which a cheaper solver stepped, as the processor was too slow, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cheaper_from_ms: Option<f64>,
 }
 
 impl SolverFaults {
@@ -120,8 +166,16 @@ impl SolverFaults {
 
     /// Returns the remarks for a report where faults make the brain's motion unreliable.
     pub fn remarks(&self) -> impl Iterator<Item = String> + use<> {
-        let Self { inverted, limited, non_finite, skipped_ms, contacts_left_out, rest_motion_mm, restless_steps } =
-            *self;
+        let Self {
+            inverted,
+            limited,
+            non_finite,
+            skipped_ms,
+            contacts_left_out,
+            rest_motion_mm,
+            restless_steps,
+            cheaper_from_ms,
+        } = *self;
         let valid = limited + non_finite + contacts_left_out == 0 && skipped_ms == 0.0;
         let invalid = (!valid).then(|| {
             format!(
@@ -139,7 +193,8 @@ impl SolverFaults {
                  {REST_MOTION_MM} mm in {restless_steps} steps: do not rely on its motion; report the case"
             )
         });
-        [invalid, inverted, restless].into_iter().flatten()
+        let cheaper = cheaper_from_ms.map(cheaper_text);
+        [invalid, inverted, restless, cheaper].into_iter().flatten()
     }
 }
 
@@ -157,6 +212,8 @@ impl SolverStage {
             solver_faults: SolverFaults::default(),
             max_displacement_mm: 0.0,
             touched_ms: f64::NEG_INFINITY,
+            asked: false,
+            coming: None,
         }
     }
 

@@ -93,6 +93,11 @@ fn hand(ms: u64) -> ToolState {
 
 /// Runs the operation, each loop as if it kept pace.
 fn operated(line: &str) -> (Recording, SessionSetup) {
+    operated_cheaper(line, END)
+}
+
+/// The same, with the cheaper solver from a tick on.
+fn operated_cheaper(line: &str, cheaper_from: u64) -> (Recording, SessionSetup) {
     let setup = setup(&format!("--quality usual {line}"), None);
     let Stages { mut haptic, tissue, .. } = stages(&setup);
     let mut tissue = tissue.expect("the program has tissue");
@@ -102,6 +107,9 @@ fn operated(line: &str) -> (Recording, SessionSetup) {
         let reading = Reading { tool: hand(tick), status: Status::Fresh };
         let input = TickInput { tick, reading, patch: &patch.1, patch_seq: patch.0, second: None };
         let done = haptic.tick(&input, &mut |_| {});
+        if tick == cheaper_from {
+            tissue.solver.wait_for_cheaper();
+        }
         tissue.solver.publish(&mut frame);
         let collision = tissue.collision.step(&done.sample, &frame);
         patch = (collision.seq, *tissue.collision.patch());
@@ -216,6 +224,24 @@ fn keys_of_speed_leave_the_force_as_it_is() {
         let most = if setup.ingredients().device == SolverDevice::Gpu { 1e-3 } else { 0.0 };
         assert!(found.iter().flatten().all(|found| *found <= most), "{given}: {found:?}");
     }
+}
+
+#[test]
+fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step() {
+    let line = "--set element=locking-free,law=stiffening,relaxation=solid-and-fluid,threads=2";
+    // While the probe is deep in the brain, which has relaxed under it.
+    let from = 1050;
+    let [(plain, _), (cheaper, _)] = [END, from].map(|from| operated_cheaper(line, from));
+    assert_eq!(replayed(&cheaper).0, END - 1);
+    let records = |recording: &Recording| recording.solver.iter().filter(|record| record.cheaper > 0).count();
+    assert!(records(&plain) == 0 && records(&cheaper) > 100);
+    let steps = |recording: &Recording| recording.solver.last().unwrap().step;
+    assert!(steps(&cheaper) < steps(&plain), "its steps are longer");
+    let apart = |(a, b): (&TickRecord, &TickRecord)| a.wrench.force.distance(b.wrench.force);
+    let found: Vec<f32> = plain.ticks.iter().zip(&cheaper.ticks).map(apart).collect();
+    let (before, after) = found.split_at(from as usize);
+    let most = |of: &[f32]| of.iter().copied().fold(0.0, f32::max);
+    assert!(most(before) == 0.0 && most(after) > 0.0 && most(after) < 0.02, "{} N, {} N", most(before), most(after));
 }
 
 #[test]

@@ -260,6 +260,9 @@ impl<'a> Replay<'a> {
             }
         }
         let Some(tissue) = &mut self.tissue else { return };
+        if last.is_some_and(|last| last.cheaper > 0) {
+            tissue.solver.wait_for_cheaper();
+        }
         let began_ms = clock.now_ms();
         let record = tissue.solver.step(&self.load.1, self.load.0);
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
