@@ -11,8 +11,8 @@
 //! ```
 //!
 //! # Practice
-//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`], a header 64 KiB;
-//! publishing one costs a few µs. Publish from the recorder's thread, not from a haptic tick.
+//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`], a header 64
+//! KiB; publishing one costs a few µs. Publish from the recorder's thread, not from a haptic tick.
 //! [`Subscriber::newest`] has no age: a dead publisher looks like a silent one, so compare the
 //! sequence numbers with the clock. Leftovers of a killed process are removed when the next one
 //! joins. Signal handlers are not changed.

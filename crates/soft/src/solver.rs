@@ -40,8 +40,8 @@ pub trait SoftSolver: Send {
         self.stable_dt_ms()
     }
 
-    /// Maker of a solver of the same body that costs less per simulated time and errs more in
-    /// motion, for a processor that is too slow; `None` where there is none.
+    /// Maker of a solver of the same body for a processor that is too slow: it costs less and errs
+    /// more in motion. `None` where there is none.
     fn cheaper(&self) -> Option<MakeSolver> {
         None
     }

@@ -17,8 +17,8 @@
 //! # Practice
 //! Sending and receiving cost the recording thread a few µs a tick; the haptic loop is not
 //! involved. The watcher takes case, models and settings from the trainee's header: nothing is
-//! measured or chosen twice, and a prepared case comes from the cache. Bone drilled before the watcher joined is not visible to it. Watching ends three
-//! seconds after the last tick.
+//! measured or chosen twice, and a prepared case comes from the cache. Bone drilled before the
+//! watcher joined is not visible to it. Watching ends three seconds after the last tick.
 //!
 //! # When not to use it
 //! Alone, between machines: shared memory is local to a machine. Run iceoryx2's tunnel
