@@ -11,6 +11,7 @@ mod person;
 use glam::{Mat2, Quat, Vec2, Vec3};
 use person::Person;
 use std::fs;
+use std::path::Path;
 use std::time::Instant;
 use trepan_link::wire::TickRecord;
 
@@ -132,13 +133,7 @@ impl Chart {
 #[test]
 fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     let home = tempfile::tempdir().unwrap();
-    let settings = serde_json::json!({ "quality": "draft", "flap_mm": FLAP_MM });
-    let Some(person) = Person::sits_down(home.path(), &settings.to_string()) else {
-        eprintln!("Xvfb or xdotool is missing: nobody sat down");
-        return;
-    };
-    person.goes_on();
-    person.waits_for_session(1);
+    let Some(person) = operating(home.path(), FLAP_MM) else { return };
     let chart = Chart::of(&person);
     let rim = |turn: f32| 0.5 * FLAP_MM * Vec2::from_angle(turn);
     let goes_to_the_rim = || {
@@ -183,6 +178,12 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
         chart.tip(&person).distance(end) < 1.5 && person.tick().time_ms > began_ms + 5e3
     });
     eprintln!("a lap at {:.0} s", person.tick().time_ms * 1e-3);
+    // She goes on holding: the foot rides on the inner table, it does not sink.
+    person.rests(6.0);
+    let ticks = person.recording().ticks;
+    let cutting = ticks.iter().filter(|tick| tick.tool == 3).map(|tick| tick.brain_distance_mm);
+    let deepest_mm = cutting.fold(f32::MAX, f32::min);
+    assert!(deepest_mm > 0.0, "the craniotome's foot sank {} mm into the brain", -deepest_mm);
     person.does("mouseup 1");
     person.waits_for("the free flap", || person.heard("the flap is free") == 1);
     person.clicks(DRAW_BACK);
@@ -199,15 +200,23 @@ const AXIAL: [f32; 2] = [870.0, 130.0];
 /// From the left edge of "Back to the start page" to the middle of "Replay", pixels.
 const TO_REPLAY: u32 = 334;
 
-#[test]
-fn nothing_that_a_person_does_by_accident_cuts_or_ends() {
-    let home = tempfile::tempdir().unwrap();
-    let Some(person) = Person::sits_down(home.path(), &serde_json::json!({ "quality": "draft" }).to_string()) else {
+/// A person in a running session with a planned flap, mm; `None` where the tools are missing.
+fn operating(home: &Path, flap_mm: f32) -> Option<Person> {
+    let settings = serde_json::json!({ "quality": "draft", "flap_mm": flap_mm });
+    let person = Person::sits_down(home, &settings.to_string());
+    if person.is_none() {
         eprintln!("Xvfb or xdotool is missing: nobody sat down");
-        return;
-    };
+    }
+    let person = person?;
     person.goes_on();
     person.waits_for_session(1);
+    Some(person)
+}
+
+#[test]
+fn a_slice_is_looked_at_and_never_cuts_or_moves_the_tool() {
+    let home = tempfile::tempdir().unwrap();
+    let Some(person) = operating(home.path(), 0.0) else { return };
     let removed =
         |person: &Person| person.recording().ticks.iter().map(|tick| f64::from(tick.removed_mm3)).sum::<f64>();
     person.points(AXIAL);
@@ -220,6 +229,13 @@ fn nothing_that_a_person_does_by_accident_cuts_or_ends() {
     person.rests(1.0);
     let moved_mm = person.tick().device.translation.distance(before);
     assert!(removed(&person) == 0.0 && moved_mm < 0.1, "a slice moved the tool by {moved_mm} mm");
+    assert_eq!(person.ends(1)["bone_removed_mm3"].as_f64(), Some(0.0));
+}
+
+#[test]
+fn escape_and_a_key_alone_never_end_the_operation() {
+    let home = tempfile::tempdir().unwrap();
+    let Some(person) = operating(home.path(), 0.0) else { return };
     let runs_on = |person: &Person, after: &str| {
         let then = person.tick().time_ms;
         person.rests(2.0);
@@ -230,9 +246,13 @@ fn nothing_that_a_person_does_by_accident_cuts_or_ends() {
     person.does("key q");
     person.rests(1.0);
     runs_on(&person, "Q alone");
-    person.does("key Escape");
-    let summary = person.ends(1);
-    assert_eq!(summary["bone_removed_mm3"].as_f64(), Some(0.0));
+}
+
+#[test]
+fn a_closed_replay_leaves_no_session_behind() {
+    let home = tempfile::tempdir().unwrap();
+    let Some(person) = operating(home.path(), 0.0) else { return };
+    person.ends(1);
     person.waits_for("the result", || person.main_button().is_some());
     person.rests(1.0);
     let [x, y] = person.main_button().unwrap();
