@@ -117,7 +117,7 @@ impl Session {
             None => None,
         };
         let watched = match &options.watch {
-            Some(name) => Some(watch::header(program, name, &choice::identity(&options, &built_in)?, &place.progress)?),
+            Some(name) => Some(watched(name, &choice::identity(&options, &built_in)?, &place.progress)?),
             None => None,
         };
         let settled = recording.as_deref().or(watched.as_ref());
@@ -538,6 +538,21 @@ impl Session {
             ..Summary::default()
         }
     }
+}
+
+/// Waits for the header of the session that is watched; a recording of nothing else.
+fn watched(name: &str, case: &Identity, progress: &Progress) -> Result<Recording, SessionError> {
+    let header = watch::header(name, || progress.is_over());
+    let header = if progress.is_over() { Err(SessionError::Cancelled) } else { header }?;
+    let theirs = Identity::of(&header);
+    if theirs.is(case) == Some(false) {
+        let (is, was) = (case.describe(), theirs.describe());
+        return Err(SessionError::Usage(format!(
+            "--watch {name}: that session operates on another case, {was}, this is {is}; give the --ct and --mri, or \
+             the --case, of that one, or none of them for the built-in case"
+        )));
+    }
+    Ok(Recording { header, ..Recording::default() })
 }
 
 /// Finds the lesson that the options name, and takes its flap and tool.

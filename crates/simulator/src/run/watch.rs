@@ -25,10 +25,7 @@
 //! (`iox2 tunnel zenoh`, of its command line tools) on both machines to forward the topics
 //! `trepan/NAME/...`; nothing changes here.
 
-use crate::case::identity::Identity;
 use crate::error::SessionError;
-use crate::program::Program;
-use crate::progress::Progress;
 use crate::run::clock::Clock;
 use crate::run::lesson::{Listener, Teacher};
 use crate::run::stop::Stop;
@@ -38,7 +35,6 @@ use std::time::Duration;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
-use trepan_link::Recording;
 use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, Topic, TopicError};
 use trepan_link::wire::{EventRecord, SessionHeader, TeacherRecord, TickRecord};
@@ -107,29 +103,12 @@ impl Watching {
     }
 }
 
-/// Waits for the session of a name to send its header; returns a recording of nothing else.
-///
-/// An error where none of this name is there, or where it operates on another case.
-pub(crate) fn header(
-    program: Program,
-    name: &str,
-    case: &Identity,
-    progress: &Progress,
-) -> Result<Recording, SessionError> {
+/// Waits for the header of the session of a name, until it is `over`.
+pub(crate) fn header(name: &str, over: impl Fn() -> bool) -> Result<SessionHeader, SessionError> {
     let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
     let session = Session::join(name).map_err(fault)?;
     let mut headers: Subscriber<SessionHeader> = session.subscriber().map_err(fault)?;
-    let header = first(name, &mut headers, || progress.is_over());
-    let header = if progress.is_over() { Err(SessionError::Cancelled) } else { header }?;
-    let watched = Identity::of(&header);
-    if watched.is(case) == Some(false) {
-        let (is, was, program) = (case.describe(), watched.describe(), program.name());
-        return Err(SessionError::Usage(format!(
-            "--watch {name}: that session operates on another case, {was}, this is {is}; give {program} the --ct and \
-             --mri, or the --case, of that one, or none of them for the built-in case"
-        )));
-    }
-    Ok(Recording { header, ..Recording::default() })
+    first(name, &mut headers, over)
 }
 
 /// Waits for the first record of a topic, until it is `over`, and logs the wait.
