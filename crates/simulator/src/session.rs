@@ -192,11 +192,10 @@ impl Session {
         let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let files = output::Files::make(&self.out, &record)?;
-        let header = self.header(&limits, second_limits.as_ref());
+        let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
         let (share, asked) = self.options.share.as_deref().map(|name| Share::open(name, &header)).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let date = output::now();
         let recorder = Recorder::create(&record, &header)?;
         let scene = match self.recording {
             None => Some((self.film(whole.clone(), None), SceneWriter::create(&output::scene_of(&record), &header)?)),
