@@ -183,7 +183,7 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     let ticks = person.recording().ticks;
     let cutting = ticks.iter().filter(|tick| tick.tool == 3).map(|tick| tick.brain_distance_mm);
     let deepest_mm = cutting.fold(f32::MAX, f32::min);
-    assert!(deepest_mm > 0.0, "the craniotome's foot sank {} mm into the brain", -deepest_mm);
+    assert!(deepest_mm > 0.0, "the craniotome's cutter sank {} mm into the brain", -deepest_mm);
     person.does("mouseup 1");
     person.waits_for("the free flap", || person.heard("the flap is free") == 1);
     person.clicks(DRAW_BACK);

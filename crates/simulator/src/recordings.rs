@@ -7,6 +7,7 @@ use crate::printable::printable;
 use crate::program::Program;
 use std::path::Path;
 use std::process::ExitCode;
+use trepan_link::wire::SessionHeader;
 use trepan_link::{Recording, repair};
 
 /// Describes what a recording lacks, with the remedy if there is one; `None` if it is complete.
@@ -33,6 +34,24 @@ pub(crate) fn open(program: Program, file: &Path, case: &Identity) -> Result<Rec
     }
     losses.iter().for_each(|losses| tracing::warn!("{}", printable(losses)));
     Ok(recording)
+}
+
+/// A recording of nothing but the header of a watched session; refuses one of another patient or of
+/// an unknown version.
+pub(crate) fn of_watched(name: &str, header: SessionHeader, case: &Identity) -> Result<Recording, SessionError> {
+    let watched = Identity::of(&header);
+    if header.app.is_empty() {
+        let fault = "its header cannot be read: run the same version on both sides";
+        return Err(SessionError::Usage(format!("--watch {name}: {fault}")));
+    }
+    if watched.is(case) == Some(false) {
+        let (is, was) = (case.describe(), watched.describe());
+        return Err(SessionError::Usage(format!(
+            "--watch {name}: that session operates on another case, {was}, this is {is}; give the --ct and --mri, or \
+             the --case, of that one, or none of them for the built-in case"
+        )));
+    }
+    Ok(Recording { header, ..Recording::default() })
 }
 
 /// Warns if the recording's case was built differently from the same images, or if its patient is

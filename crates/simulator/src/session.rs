@@ -55,6 +55,8 @@ pub struct Session {
     device: DeviceName,
     second: Option<DeviceName>,
     recording: Option<Arc<Recording>>,
+    /// Of a watched session: its header.
+    watched: Option<Recording>,
     case: Identity,
     setup: SessionSetup,
     /// Input files of the case; empty for a case folder.
@@ -137,7 +139,20 @@ impl Session {
             .out
             .clone()
             .unwrap_or_else(|| output::dated(program, options.sessions.as_deref(), options.name.as_deref()));
-        Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, lesson, place })
+        Ok(Self {
+            program,
+            options,
+            device,
+            second,
+            recording,
+            watched,
+            case: identity,
+            setup,
+            inputs,
+            out,
+            lesson,
+            place,
+        })
     }
 
     /// Whether the session only shows a recording in the window: then it writes nothing.
@@ -184,6 +199,9 @@ impl Session {
         };
         let limits = self.limits(&hand, hand::FIRST);
         let second_limits = second.as_ref().map(|second| self.limits(second, hand::SECOND));
+        let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
+        // Before the last preparations: a watcher loads beside them.
+        let (share, asked) = self.options.share.as_deref().map(|name| Share::open(name, &header)).transpose()?.unzip();
         let start = self.start();
         let limits_of_both = (&limits, second_limits.as_ref());
         self.place.progress.next("preparing contact and tissue")?;
@@ -192,8 +210,6 @@ impl Session {
         let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let files = output::Files::make(&self.out, &record)?;
-        let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
-        let (share, asked) = self.options.share.as_deref().map(|name| Share::open(name, &header)).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
         let recorder = Recorder::create(&record, &header)?;
@@ -288,6 +304,10 @@ impl Session {
 
     /// Describes what the replayed recording lacks, and whether its case was built differently.
     fn replay_remarks(&self) -> (Option<String>, Option<String>) {
+        if let Some(watched) = &self.watched {
+            let unlike = recordings::unlike(watched, &self.case);
+            return (None, unlike.map(|text| format!("the watched session: {text}")));
+        }
         let (Some(recording), Some(path)) = (&self.recording, self.device.recording()) else { return (None, None) };
         (recordings::not_whole(self.program, path, recording), recordings::unlike(recording, &self.case))
     }
@@ -387,7 +407,11 @@ impl Session {
         let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
         let recorded = || DeviceLimits::recorded(self.recording.as_deref(), name);
         let of = |device: &dyn HapticDevice| DeviceLimits::of(&device.capabilities(), scale, self.options.force_scale);
-        hand.device.as_deref().map_or_else(recorded, of)
+        match &self.watched {
+            // The watcher's bone gives way as the trainee's does.
+            Some(watched) => DeviceLimits::recorded(Some(watched), name),
+            None => hand.device.as_deref().map_or_else(recorded, of),
+        }
     }
 
     /// Tool before the first reading of its device. A replay starts here too, because the first
@@ -543,15 +567,7 @@ impl Session {
 fn watched(name: &str, case: &Identity, progress: &Progress) -> Result<Recording, SessionError> {
     let header = watch::header(name, || progress.is_over());
     let header = if progress.is_over() { Err(SessionError::Cancelled) } else { header }?;
-    let theirs = Identity::of(&header);
-    if theirs.is(case) == Some(false) {
-        let (is, was) = (case.describe(), theirs.describe());
-        return Err(SessionError::Usage(format!(
-            "--watch {name}: that session operates on another case, {was}, this is {is}; give the --ct and --mri, or \
-             the --case, of that one, or none of them for the built-in case"
-        )));
-    }
-    Ok(Recording { header, ..Recording::default() })
+    recordings::of_watched(name, header, case)
 }
 
 /// Finds the lesson that the options name, and takes its flap and tool.

@@ -5,7 +5,7 @@ use trepan_geometry::Vec3;
 use trepan_soft::BodyError;
 
 /// Settings of the TLED solver. The simulators use the defaults, except for a `mass_scaling` of a
-/// hundredth.
+/// hundredth, or of a tenth where the processor is too slow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// Damping of motion.

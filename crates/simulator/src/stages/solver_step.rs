@@ -11,12 +11,13 @@
 
 use crate::stages::collision_step::SoftFrame;
 use serde::Serialize;
+use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;
-use trepan_soft::{Loads, SoftSolver, StepReport};
+use trepan_soft::{Loads, MakeSolver, SoftSolver, StepReport};
 
 /// Steps between two records while the contact is unchanged.
 pub(crate) const EACH: u64 = 32;
@@ -74,10 +75,13 @@ impl SolverStage {
         }
     }
 
-    /// Has a cheaper solver made, once, on a thread of its own; it steps from when it is there.
+    /// Has a cheaper solver made, once; it steps from when it is there.
     pub fn ask_for_cheaper(&mut self) {
-        if !std::mem::replace(&mut self.asked, true) {
-            self.coming = self.solver.cheaper().map(std::thread::spawn);
+        let Some(make) = self.maker.as_ref().and_then(|_| self.solver.cheaper()) else { return };
+        if let Some(Maker { ask, thread }) = self.maker.take() {
+            // The thread waits for it.
+            ask.send(make).ok();
+            self.coming = Some(thread);
         }
     }
 
@@ -92,7 +96,10 @@ impl SolverStage {
     /// Lets the cheaper solver go on once it is made; returns whether it does from this step on.
     fn takes_cheaper(&mut self) -> bool {
         let Some(coming) = self.coming.take_if(|coming| coming.is_finished()) else { return false };
-        let Ok(Some(mut solver)) = coming.join() else { return false };
+        let Ok(Some(mut solver)) = coming.join() else {
+            tracing::warn!("the brain's solver cannot take longer steps: its body was refused");
+            return false;
+        };
         solver.resume(self.solver.state(), &self.solver.memory());
         self.solver = solver;
         self.solver_faults.cheaper_from_ms = Some(self.time_ms);
@@ -115,9 +122,26 @@ pub struct SolverStage {
     max_displacement_mm: f32,
     /// Simulated time of the last touch of the brain, ms.
     touched_ms: f64,
-    /// Whether a cheaper solver was asked for, and where it is made.
-    asked: bool,
+    /// Who can make a cheaper solver, until asked, and then where it is made.
+    maker: Option<Maker>,
     coming: Option<JoinHandle<Option<Box<dyn SoftSolver>>>>,
+}
+
+/// A thread that waits to make a solver. It begins with the stage, not when it is asked: then it
+/// would inherit the real-time priority of the solver's loop, and its solver's threads with it.
+struct Maker {
+    ask: Sender<MakeSolver>,
+    thread: JoinHandle<Option<Box<dyn SoftSolver>>>,
+}
+
+impl Maker {
+    /// Starts the thread; it ends when this is dropped.
+    fn start() -> Option<Self> {
+        let (ask, asked) = channel::<MakeSolver>();
+        let make = move || asked.recv().ok().and_then(|make| make());
+        let thread = std::thread::Builder::new().name("cheaper".into()).spawn(make).ok()?;
+        Some(Self { ask, thread })
+    }
 }
 
 /// Says that a cheaper solver steps from some simulated time on, ms.
@@ -212,7 +236,7 @@ impl SolverStage {
             solver_faults: SolverFaults::default(),
             max_displacement_mm: 0.0,
             touched_ms: f64::NEG_INFINITY,
-            asked: false,
+            maker: Maker::start(),
             coming: None,
         }
     }

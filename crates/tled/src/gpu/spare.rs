@@ -11,7 +11,7 @@ use crate::tled::Tled;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_gpu::{Gpu, Prefer};
-use trepan_soft::{Body, Loads, NodeState, SoftSolver, StepReport};
+use trepan_soft::{Body, Loads, MakeSolver, NodeState, SoftSolver, StepReport};
 
 /// Solver on the graphics device that goes on on the processor when the device is lost.
 pub struct WithSpare {
@@ -73,5 +73,13 @@ impl SoftSolver for WithSpare {
 
     fn next_dt_ms(&self) -> f32 {
         if self.is_lost() { self.spare.next_dt_ms() } else { self.card.next_dt_ms() }
+    }
+
+    fn cheaper(&self) -> Option<MakeSolver> {
+        if self.is_lost() { self.spare.cheaper() } else { None }
+    }
+
+    fn memory(&self) -> Vec<f32> {
+        if self.is_lost() { self.spare.memory() } else { Vec::new() }
     }
 }
