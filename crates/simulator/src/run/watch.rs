@@ -8,7 +8,7 @@
 //! [lesson](super::lesson).
 //!
 //! ```text
-//!  trainee: before the first tick ──header──> shared memory ──> watcher: case, models
+//!  trainee: before the first tick ──header──> shared memory ──> watcher: its models
 //!           recording thread ──tick, event──>               ──> pump thread ──────────┐
 //!                            <────teacher────               <── watcher's window      │
 //!                                                               haptic loop <── cell <┘
@@ -16,9 +16,10 @@
 //!
 //! # Practice
 //! Sending and receiving cost the recording thread a few µs a tick; the haptic loop is not
-//! involved. The watcher takes case, models and settings from the trainee's header: nothing is
-//! measured or chosen twice, and a prepared case comes from the cache. Bone drilled before the
-//! watcher joined is not visible to it. Watching ends three seconds after the last tick.
+//! involved. The watcher is given the same images, and takes models and settings from the trainee's
+//! header: nothing is measured or chosen twice, and a prepared case comes from the cache. Bone
+//! drilled before the watcher joined is not visible to it. Watching ends three seconds after the
+//! last tick.
 //!
 //! # When not to use it
 //! Alone, between machines: shared memory is local to a machine. Run iceoryx2's tunnel

@@ -94,6 +94,7 @@ impl SolverStage {
     }
 
     /// Lets the cheaper solver go on once it is made; returns whether it does from this step on.
+    /// This step alone allocates, and ends the former solver's threads.
     fn takes_cheaper(&mut self) -> bool {
         let Some(coming) = self.coming.take_if(|coming| coming.is_finished()) else { return false };
         let Ok(Some(mut solver)) = coming.join() else {

@@ -228,7 +228,7 @@ fn keys_of_speed_leave_the_force_as_it_is() {
 
 #[test]
 fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step() {
-    let line = "--set element=locking-free,law=stiffening,relaxation=solid-and-fluid,threads=2";
+    let line = "--set element=locking-free,law=stiffening,relaxation=prony,threads=2";
     // While the probe is deep in the brain, which has relaxed under it.
     let from = 1050;
     let [(plain, _), (cheaper, _)] = [END, from].map(|from| operated_cheaper(line, from));
@@ -241,7 +241,8 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
     let found: Vec<f32> = plain.ticks.iter().zip(&cheaper.ticks).map(apart).collect();
     let (before, after) = found.split_at(from as usize);
     let most = |of: &[f32]| of.iter().copied().fold(0.0, f32::max);
-    assert!(most(before) == 0.0 && most(after) > 0.0 && most(after) < 0.02, "{} N, {} N", most(before), most(after));
+    // Without the stress memory it is 0.019 N, with it 0.0015.
+    assert!(most(before) == 0.0 && most(after) > 0.0 && most(after) < 0.004, "{} N, {} N", most(before), most(after));
 }
 
 #[test]
