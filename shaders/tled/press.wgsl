@@ -43,7 +43,8 @@ var<workgroup> sums: array<vec3f, LANES>;
 // Force of a spring that is so deep, mm, on nodes that come at this speed, mm/ms.
 fn pressed(spring: Spring, depth: f32, coming: f32, compliance: f32, touches: bool) -> f32 {
     let held = 1.0 + now.gain * (spring.stiffness * now.dt + spring.damping) * compliance;
-    let force = (spring.stiffness * (depth + now.dt * coming) + spring.damping * (coming - spring.tool_velocity)) / held;
+    let closing = coming - spring.tool_velocity;
+    let force = (spring.stiffness * (depth + now.dt * closing) + spring.damping * closing) / held;
     let finite = (bitcast<u32>(force) & 0x7f800000u) != 0x7f800000u;
     return select(0.0, max(force, 0.0), touches && finite);
 }

@@ -9,9 +9,10 @@
 //! offset + x̄·n and γ the velocity that a force gives a mass (dt where nothing damps):
 //!
 //! ```text
-//! v̄⁺ = v̄ - γ p Σ wᵢ²/mᵢ     p = k (d + dt v̄⁺) + b (v̄⁺ - v_tool)
-//! p = max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + γ (k dt + b) Σ wᵢ²/mᵢ))
+//! v̄⁺ = v̄ - γ p Σ wᵢ²/mᵢ     p = k (d + dt c⁺) + b c⁺     c = v̄ - v_tool
+//! p = max(0, (k (d + dt c) + b c) / (1 + γ (k dt + b) Σ wᵢ²/mᵢ))
 //! ```
+//! The tool goes on during the step: were it to stand, a moving one would be `k dt v_tool` too deep.
 //! At rest v̄ is what undoes p in a step, so p = k d: stiffness, masses and step move the way there
 //! and not the end. With the mesh's own ω and q = γ (k dt + b) Σ wᵢ²/mᵢ the step stays stable for
 //! `dt² ω² ≤ 4 + 2 q`: never for less than without the spring, however stiff and damped it is.
@@ -145,7 +146,7 @@ impl ImplicitSprings {
         }
         let held = 1.0 + step.gain_ms * (spring.stiffness * step.dt_ms + spring.damping) * compliance;
         let closing = coming - spring.tool_normal_velocity;
-        let force = (spring.stiffness * (depth + step.dt_ms * coming) + spring.damping * closing) / held;
+        let force = (spring.stiffness * (depth + step.dt_ms * closing) + spring.damping * closing) / held;
         if force.is_finite() && force > 0.0 { force } else { 0.0 }
     }
 }

@@ -227,9 +227,10 @@ impl Corotational {
         for spring in loads.contacts.all().take(MAX_SPRINGS + MAX_PLANES) {
             let depth = self.nodes.depth_mm(&spring);
             let (k, b) = (f64::from(spring.stiffness), f64::from(spring.damping));
-            let push = k * depth - b * f64::from(spring.tool_normal_velocity);
+            let rate = h * k + b;
+            let push = k * depth - rate * f64::from(spring.tool_normal_velocity);
             if depth > 0.0 && !spring.is_empty() {
-                let touch = Touch { spring, push, rate: h * k + b };
+                let touch = Touch { spring, push, rate };
                 touch.spread(&mut self.system.right, -h * push, &self.nodes.inverse_masses);
                 self.system.touches.push(touch);
             }

@@ -197,7 +197,9 @@ impl Xpbd {
     }
 
     fn press(&mut self, contact: &NodalContact, h: f32) -> f32 {
-        let (depth, stiffness) = (self.nodes.depth_mm(contact), f64::from(contact.stiffness));
+        // The tool goes on during the substep, as the nodes did.
+        let depth = self.nodes.depth_mm(contact) - f64::from(h * contact.tool_normal_velocity);
+        let stiffness = f64::from(contact.stiffness);
         if contact.is_empty() || depth <= 0.0 || stiffness <= 0.0 {
             return 0.0;
         }
