@@ -1,5 +1,6 @@
 //! What the solvers of both devices keep of a body: settings, order, stable step, damping, state.
 
+use crate::averaging;
 use crate::bound::Bound;
 use crate::config::{Config, Damping};
 use crate::dynamic_scaling::DynamicScaling;
@@ -15,6 +16,8 @@ const GROWTH_AHEAD: f32 = 1.1;
 /// Shortest recommended step, as a share of the stable one at rest. What needs a shorter one is
 /// recovering from inversion, and takes substeps.
 const SHORTEST: f32 = 0.5;
+/// Step from which accelerations are not averaged: contacts come once in a millisecond.
+const LONG_ENOUGH_MS: f32 = 0.6;
 /// Tolerance that keeps rounding from adding a substep.
 const NEARLY: f32 = 1.0 - 1e-5;
 
@@ -43,12 +46,15 @@ impl Base {
         let scaling = Scaling::of(body, config.mass_scaling);
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
         let lowest_per_ms = lowest_per_ms(body, config.damping, &stiffness);
+        let bound = Bound::of(body, &stiffness, &scaling);
+        let needs_longer = config.safety * bound.elements_ms() < LONG_ENOUGH_MS;
+        let selective_mass_scaling = config.selective_mass_scaling && needs_longer;
         let base = Self {
-            config: *config,
+            config: Config { selective_mass_scaling, ..*config },
             layout: Layout::of(body),
             rest: body.mesh.positions.clone(),
             state: NodeState::at_rest(&body.mesh),
-            bound: Bound::of(body, &stiffness, &scaling),
+            bound,
             // α = 2 ω₁ is critical.
             damping_per_ms: match config.damping {
                 Damping::None => 0.0,
@@ -64,7 +70,12 @@ impl Base {
 
     /// Longest step that is stable with margin at rest, ms.
     pub fn stable_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound.elements_ms()
+        self.config.safety * self.bound.elements_ms() * self.longer()
+    }
+
+    /// Factor on the stable step of averaged accelerations.
+    fn longer(&self) -> f32 {
+        if self.config.selective_mass_scaling { averaging::LONGER } else { 1.0 }
     }
 
     /// Which elements get mass: those that have stiffened more than the step at rest bears.
@@ -73,7 +84,11 @@ impl Base {
         let stiffest = self.bound.stiffest;
         // Of the growth with which `longest_ms` is still the stable step at rest.
         let limit = ((SUBSTEP_SAFETY / self.config.safety).powi(2) - 1.0) / GROWTH_AHEAD * stiffest;
-        if most > 1.0 && limit > 0.0 { DynamicScaling { limit, stiffest, most } } else { DynamicScaling::NONE }
+        let averages = self.config.selective_mass_scaling;
+        match averages || (most > 1.0 && limit > 0.0) {
+            true => DynamicScaling { limit: limit.max(0.0), stiffest, most, averages },
+            false => DynamicScaling::NONE,
+        }
     }
 
     /// Recommended length of the next step, ms, where an element's ω² grew by `growth` in the last
@@ -89,7 +104,7 @@ impl Base {
 
     /// Longest substep where an element's ω² grew by `growth`, 1/ms².
     pub fn longest_ms(&self, growth: f32) -> f32 {
-        self.stable_dt_ms().min(SUBSTEP_SAFETY * self.bound.deformed_ms(growth))
+        self.stable_dt_ms().min(SUBSTEP_SAFETY * self.longer() * self.bound.deformed_ms(growth))
     }
 }
 

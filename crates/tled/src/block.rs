@@ -14,7 +14,7 @@
 //! block belongs to. Forces are added lane by lane for every register width, so that every kernel
 //! sums in the same order.
 
-use crate::dynamic_scaling::DynamicScaling;
+use crate::dynamic_scaling::{Added, Borne, DynamicScaling};
 use crate::element::{deformation, deformation_of, forces};
 use crate::law::{Constitutive, Deformation, Stress};
 use crate::relaxation::{Fade, PRONY_TERMS};
@@ -60,11 +60,10 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     /// Mean `J - 1` by node; read with averaged pressure only.
     pub averages: &'a [f32; NODES],
     pub sums: &'a mut [Quad; NODES],
-    /// A quarter of each element's mass, g, by block.
-    pub quarter_mass: &'a [[f32; WIDTH]],
+    pub borne: &'a [Borne],
     pub dynamic: DynamicScaling,
-    /// Mass for nodes of stiffened elements: node of the part, and g.
-    pub added: &'a mut Vec<(u32, f32)>,
+    /// Mass for nodes of stiffened elements, by node of the part.
+    pub added: &'a mut Vec<Added>,
     pub law: PhantomData<M>,
 }
 
@@ -189,9 +188,8 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let gained = stiffness(&stress, moduli, &d, (volume_change, slope))
                     - stiffness_at_rest(M::at_rest(&constants), moduli);
                 let mut grown = L::load(&block.omega2, part) * gained;
-                if (L::splat(self.dynamic.limit) - grown).not_positive() > 0 {
-                    grown =
-                        self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.quarter_mass[i]), self.added);
+                if (L::load(&self.borne[i].growth, part) - grown).not_positive() > 0 {
+                    grown = self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.borne[i]), self.added);
                 }
                 growth = grown.larger(growth);
                 if T > 0 {

@@ -47,7 +47,14 @@ impl Elements {
         let (force_slots, slots) = ForceSlots::of(&owned, &node_groups, layout.node_at.len(), inverse_volume);
         let part = |((tets, groups), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
             let places = groups.iter().map(|&s| node_groups.place_of[s as usize]).collect();
-            Part::of(body, scaling, tets, &groups_of, PartGroups { node_groups: groups, places, slots }, config)
+            Part::of(
+                body,
+                (scaling, &dynamic),
+                tets,
+                &groups_of,
+                PartGroups { node_groups: groups, places, slots },
+                config,
+            )
         };
         let parts = tets_of.iter().zip(owned).zip(slots).map(part).collect();
         Self {
@@ -107,6 +114,11 @@ impl Elements {
     /// Moves the nodes.
     pub fn update(&mut self, update: Update) {
         self.team.compute(Work::Update(update));
+    }
+
+    /// Prepares forces that average the accelerations of the coming update over the elements.
+    pub fn oppose(&mut self, update: Update) {
+        self.team.oppose(update);
     }
 
     /// Force of the elements on the node at `place`, N.
@@ -183,12 +195,16 @@ mod tests {
         let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
         let count = layout.node_at.len();
         let forces = |kernel: Kernel, threads: usize| {
-            let nodes = Nodes::of(body, &layout, &body.lumped_masses_g());
+            let nodes = Nodes::of(body, &layout, &body.lumped_masses_g(), None);
             (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
             let config = Config { kernel, averaged_pressure: averaged, relaxation, threads, ..Config::default() };
             let scaling = Scaling::of(body, 0.0);
-            let dynamic =
-                DynamicScaling { limit: 0.1 * scaling.stiffest as f32, stiffest: scaling.stiffest as f32, most: 4.0 };
+            let dynamic = DynamicScaling {
+                limit: 0.1 * scaling.stiffest as f32,
+                stiffest: scaling.stiffest as f32,
+                most: 4.0,
+                averages: false,
+            };
             let mut elements = Elements::of(body, &layout, (&scaling, dynamic), nodes, &config);
             let mut compute = || {
                 elements.volumes(0.7);

@@ -37,6 +37,7 @@
 //! plain 4-node tetrahedra lock. For slow processes (minutes): the speed of sound limits the step,
 //! so use a static solver.
 
+mod averaging;
 mod base;
 mod block;
 mod bound;

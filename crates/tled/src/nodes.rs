@@ -6,7 +6,9 @@
 //! sleeping part does not move until a force pushes it. Any thread may update any run of nodes,
 //! because a node's update depends only on its state and its slots.
 
+use crate::averaging::Averaging;
 use crate::damping::RigidMotion;
+use crate::dynamic_scaling::Added;
 use crate::field::{Field, Scalars};
 use crate::force_slots::ForceSlots;
 use glam::Vec4;
@@ -38,6 +40,12 @@ pub(crate) struct Nodes {
     rest: Vec<Vec4>,
     /// Anchors; empty where the body has none.
     anchors: Vec<Anchor>,
+    /// Where accelerations are averaged: by whom, velocity changes of a step before it, mm/ms, and
+    /// forces against them, N, which are valid while `is_opposed`.
+    averaging: Option<Averaging>,
+    changes: Field,
+    opposed: Field,
+    is_opposed: AtomicBool,
     /// Nodes clamped to a limit, and nodes reset because they were not finite, since `finish`.
     limited: AtomicU32,
     non_finite: AtomicU32,
@@ -59,6 +67,16 @@ pub(crate) struct Update {
     /// Nodes beside a sleeping part do not move while a step from rest would move them by less than
     /// this, mm.
     pub calm_mm: f32,
+}
+
+/// What the nodes need in a substep.
+#[derive(Clone, Copy)]
+struct Flags {
+    anything_pushes: bool,
+    may_sleep: bool,
+    is_heavier: bool,
+    is_anchored: bool,
+    is_opposed: bool,
 }
 
 impl Update {
@@ -123,10 +141,15 @@ pub(crate) fn anchors_by_place(body: &Body, layout: &Layout) -> Vec<Anchor> {
 impl Nodes {
     /// Creates nodes at rest with the given masses by mesh node, g. Added mass (mass scaling) has
     /// no weight.
-    pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
+    pub fn of(body: &Body, layout: &Layout, masses: &[f64], averaging: Option<Averaging>) -> Self {
         let (inverse_mass, weight) = inverse_masses_and_weights(body, layout, masses);
         let field = || Field::zeroed(layout.node_at.len());
+        let averaged = || Field::zeroed(if averaging.is_some() { layout.node_at.len() } else { 0 });
         Self {
+            changes: averaged(),
+            opposed: averaged(),
+            is_opposed: AtomicBool::new(false),
+            averaging,
             u: field(),
             v: field(),
             external: field(),
@@ -146,44 +169,23 @@ impl Nodes {
     /// Moves the nodes at some places by one substep.
     pub fn update(&self, places: Range<usize>, force_slots: &ForceSlots, update: &Update) {
         let [keep, gain] = update.keep_and_gain();
-        let (dt_ms, is_anchored) = (update.dt_ms, !self.anchors.is_empty());
+        let dt_ms = update.dt_ms;
         let square = |limit: f32| (limit * limit).min(f32::MAX);
         let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
-        // Unneeded fields are neither read nor written: the update is limited by memory bandwidth,
-        // about 100 bytes a node.
-        let (anything_pushes, may_sleep) = (self.is_pushed.load(Relaxed), update.calm_mm > 0.0);
-        let is_heavier = self.is_heavier.load(Relaxed);
+        let flags = self.flags(update);
         for place in places {
-            let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
-            if inverse_mass == 0.0 {
+            let (u, v) = (self.u.vector(place), self.v.vector(place));
+            if self.inverse_mass[place] == 0.0 {
                 // A fixed node moves with its prescribed velocity.
                 self.u.set(place, (u + v * dt_ms).to_array());
-                self.take_external(place, anything_pushes);
+                self.take_external(place, flags.anything_pushes);
                 continue;
             }
-            let (mut force, external) = (force_slots.force(place), self.take_external(place, anything_pushes));
-            let is_beside_sleepers = force.w > 0.0;
-            force.w = 0.0;
-            let lightness = if is_heavier { self.lightness(place) } else { 1.0 };
-            let gravity = update.weight_at(self.rest[place] + u);
-            let pull = (gravity * self.weight[place] + (force + external) * inverse_mass) * lightness;
-            let mut is_pushed = external != Vec4::ZERO;
-            if is_beside_sleepers {
-                is_pushed |= pull.length() * dt_ms * dt_ms > update.calm_mm;
-                if !is_pushed {
-                    self.pushed.set(place, 0.0);
-                    self.v.set(place, [0.0; 4]);
-                    continue;
-                }
-            }
-            if may_sleep {
-                self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
-            }
-            let velocity = update.carried(self.rest[place] + u, v, keep) + pull * gain;
-            let velocity = match is_anchored {
-                true => self.anchored(place, u, velocity, inverse_mass * lightness * gain, update),
-                false => velocity,
+            let Some([_, velocity]) = self.kicked(place, [u, v], force_slots, update, [keep, gain], flags) else {
+                self.v.set(place, [0.0; 4]);
+                continue;
             };
+            let velocity = velocity.with_w(0.0);
             let after = u + velocity * dt_ms;
             // False for NaN.
             let within = velocity.length_squared() <= fastest && after.length_squared() <= furthest;
@@ -191,6 +193,111 @@ impl Nodes {
             self.u.set(place, after.to_array());
             self.v.set(place, velocity.to_array());
         }
+    }
+
+    /// What the nodes need in this substep. Unneeded fields are neither read nor written: the update
+    /// is limited by memory bandwidth, about 100 bytes a node.
+    fn flags(&self, update: &Update) -> Flags {
+        Flags {
+            anything_pushes: self.is_pushed.load(Relaxed),
+            may_sleep: update.calm_mm > 0.0,
+            is_heavier: self.is_heavier.load(Relaxed),
+            is_anchored: !self.anchors.is_empty(),
+            is_opposed: self.is_opposed.load(Relaxed),
+        }
+    }
+
+    /// Velocity of a free node that damping leaves, and the one after a substep, mm/ms; none for a
+    /// node that rests beside a sleeping part.
+    #[inline(always)]
+    fn kicked(
+        &self,
+        place: usize,
+        [u, v]: [Vec4; 2],
+        force_slots: &ForceSlots,
+        update: &Update,
+        [keep, gain]: [f32; 2],
+        flags: Flags,
+    ) -> Option<[Vec4; 2]> {
+        let (inverse_mass, external) = (self.inverse_mass[place], self.take_external(place, flags.anything_pushes));
+        let lightness = if flags.is_heavier { self.lightness(place) } else { 1.0 };
+        let carried = update.carried(self.rest[place] + u, v, keep);
+        let opposed = if flags.is_opposed { self.opposed.vector(place) } else { Vec4::ZERO };
+        if flags.is_opposed && external == Vec4::ZERO {
+            let change = self.changes.vector(place);
+            if change.w == 0.0 {
+                return Some([carried, carried + change - opposed * (inverse_mass * lightness * gain)]);
+            }
+        }
+        let mut force = force_slots.force(place) - opposed;
+        let is_beside_sleepers = force.w > 0.0;
+        force.w = 0.0;
+        let gravity = update.weight_at(self.rest[place] + u);
+        let pull = (gravity * self.weight[place] + (force + external) * inverse_mass) * lightness;
+        let mut is_pushed = external != Vec4::ZERO;
+        if is_beside_sleepers {
+            is_pushed |= pull.length() * update.dt_ms * update.dt_ms > update.calm_mm;
+            if !is_pushed {
+                self.pushed.set(place, 0.0);
+                return None;
+            }
+        }
+        if flags.may_sleep {
+            self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
+        }
+        let velocity = carried + pull * gain;
+        let velocity = match flags.is_anchored {
+            true => self.anchored(place, u, velocity, inverse_mass * lightness * gain, update),
+            false => velocity,
+        };
+        // Where the fourth number is 0, another force changes the velocity by itself alone.
+        let alone = external == Vec4::ZERO && !flags.may_sleep && !self.is_anchored(place);
+        Some([carried, velocity.with_w(if alone { 0.0 } else { 1.0 })])
+    }
+
+    /// Whether an anchor acts on the node at a place.
+    #[inline(always)]
+    fn is_anchored(&self, place: usize) -> bool {
+        self.anchors.get(place).is_some_and(|anchor| anchor.along + anchor.across + anchor.open_mm2 != 0.0)
+    }
+
+    /// Finds the velocity changes of some nodes in a substep without moving them.
+    pub fn predict(&self, places: Range<usize>, force_slots: &ForceSlots, update: &Update) {
+        let (keep_and_gain, flags) = (update.keep_and_gain(), self.flags(update));
+        for place in places {
+            let state = [self.u.vector(place), self.v.vector(place)];
+            let kicked = match self.inverse_mass[place] == 0.0 {
+                true => None,
+                false => self.kicked(place, state, force_slots, update, keep_and_gain, flags),
+            };
+            let change = kicked.map_or(Vec4::ZERO, |[carried, velocity]| velocity - carried);
+            self.changes.set(place, change.to_array());
+        }
+    }
+
+    /// Finds the forces against the predicted changes of some nodes that average them over elements.
+    pub fn oppose(&self, places: Range<usize>, update: &Update) {
+        let (Some(averaging), [_, gain]) = (&self.averaging, update.keep_and_gain()) else { return };
+        for place in places {
+            let force = averaging.opposed(place, |at| self.changes.vector(at)) / gain;
+            self.opposed.set(place, force.with_w(0.0).to_array());
+        }
+    }
+
+    /// Adds the same of an element that has stiffened.
+    pub fn oppose_added(&self, added: [Added; 4], update: &Update) {
+        let [_, gain] = update.keep_and_gain();
+        let changes = added.map(|a| self.changes.vector(a.node as usize));
+        let mean = (changes[0] + changes[1] + changes[2] + changes[3]) * 0.25;
+        for (Added { node, averaged, .. }, change) in added.into_iter().zip(changes) {
+            let force = self.opposed.vector(node as usize) + (change - mean) * (averaged / gain);
+            self.opposed.set(node as usize, force.with_w(0.0).to_array());
+        }
+    }
+
+    /// From now on, and until the update, the forces against changes count.
+    pub fn count_opposed(&self) {
+        self.is_opposed.store(true, Relaxed);
     }
 
     /// Velocity of a node after a substep under its element force alone, mm/ms. A fixed node keeps
@@ -202,6 +309,8 @@ impl Nodes {
         }
         let [keep, gain] = update.keep_and_gain();
         let (at, lightness) = (self.rest[place] + u, self.lightness(place));
+        let opposed = if self.is_opposed.load(Relaxed) { self.opposed.vector(place) } else { Vec4::ZERO };
+        let force = force - opposed.truncate();
         let pull = update.weight_at(at).truncate() * self.weight[place] + force * inverse_mass;
         let velocity = update.carried(at, v, keep).truncate() + pull * (lightness * gain);
         match self.anchors.is_empty() {
@@ -214,10 +323,10 @@ impl Nodes {
     /// any stiffness. `gain` is the velocity that a force gives the node, mm/ms for N.
     #[inline(always)]
     fn anchored(&self, place: usize, u: Vec4, velocity: Vec4, gain: f32, update: &Update) -> Vec4 {
-        let Anchor { normal, along, across, in_fluid, open_mm2, .. } = self.anchors[place];
-        if along + across + open_mm2 == 0.0 {
+        if !self.is_anchored(place) {
             return velocity;
         }
+        let Anchor { normal, along, across, in_fluid, open_mm2, .. } = self.anchors[place];
         let (normal, fluid) = (normal.extend(0.0), &update.fluid);
         let held = 1.0 - in_fluid * fluid.dryness((self.rest[place] + u).truncate());
         let velocity = velocity + normal * (open_mm2 * fluid.opening_mpa * gain);
@@ -286,6 +395,7 @@ impl Nodes {
     /// non-finite nodes.
     pub fn finish(&self) -> [u32; 2] {
         self.is_pushed.store(false, Relaxed);
+        self.is_opposed.store(false, Relaxed);
         [&self.limited, &self.non_finite].map(|count| count.swap(0, Relaxed))
     }
 

@@ -21,7 +21,7 @@
 
 use crate::block::{Block, Forces, Memory, Strain, Volumes};
 use crate::config::Config;
-use crate::dynamic_scaling::DynamicScaling;
+use crate::dynamic_scaling::{Added, Borne, DynamicScaling};
 use crate::force_slots::ForceSlots;
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, Stiffening};
 use crate::nodes::Nodes;
@@ -43,8 +43,8 @@ pub(crate) struct Part {
     /// A quarter of the volume change of the elements around each node, mm³; then the mean `J - 1`
     /// of its node group.
     volumes: Box<[f32; NODES]>,
-    /// Mass for nodes of stiffened elements in the last force pass: node of the part, and g.
-    added: Vec<(u32, f32)>,
+    /// Mass for nodes of stiffened elements in the last force pass, by node of the part.
+    added: Vec<Added>,
     /// Report of the last force pass.
     pub report: PassReport,
     tets: usize,
@@ -94,7 +94,7 @@ trait LawElements: Send {
         kernel: Kernel,
         how: &Forcing,
         of: (&[Quad; NODES], &[f32; NODES]),
-        out: (&mut [Quad; NODES], &mut Vec<(u32, f32)>),
+        out: (&mut [Quad; NODES], &mut Vec<Added>),
     ) -> PassReport;
     fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]);
     /// The stress memory.
@@ -106,8 +106,7 @@ struct Blocks<M, const K: usize, const T: usize> {
     memory: Vec<Memory<T>>,
     /// Of every block with averaged pressure, else empty.
     strains: Vec<Strain>,
-    /// A quarter of each element's mass, g, by block.
-    quarter_mass: Vec<[f32; WIDTH]>,
+    borne: Vec<Borne>,
     law: PhantomData<M>,
 }
 
@@ -116,7 +115,7 @@ impl Part {
     /// `groups_of` gives the node groups of an element's corners.
     pub fn of(
         body: &Body,
-        scaling: &Scaling,
+        (scaling, dynamic): (&Scaling, &DynamicScaling),
         tets: &[u32],
         groups_of: &dyn Fn(u32) -> [u32; 4],
         groups: PartGroups,
@@ -125,7 +124,7 @@ impl Part {
         let nodes = |t: u32| groups_of(t).map(|s| groups.node_groups.partition_point(|&o| o < s) as u32);
         let zero = vec![[0.0; 4]; groups.places.len()];
         Self {
-            elements: elements_of(body, scaling, tets, &nodes, config),
+            elements: elements_of(body, (scaling, dynamic), tets, &nodes, config),
             u: bytemuck::zeroed_box(),
             sums: bytemuck::zeroed_box(),
             volumes: bytemuck::zeroed_box(),
@@ -179,9 +178,10 @@ impl Part {
         self.groups.slots.iter().zip(&*self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
     }
 
-    /// Mass for nodes of elements that had stiffened in the last force pass: place, and g.
-    pub fn added(&self) -> impl Iterator<Item = (usize, f32)> {
-        self.added.iter().map(|&(node, grams)| (self.groups.places[node as usize] as usize, grams))
+    /// What nodes of stiffened elements get from the last force pass, by place.
+    pub fn added(&self) -> impl Iterator<Item = [Added; 4]> {
+        let place = |a: Added| Added { node: self.groups.places[a.node as usize], ..a };
+        self.added.as_chunks::<4>().0.iter().map(move |of| of.map(place))
     }
 
     /// Number of elements, and number of awake elements.
@@ -234,12 +234,12 @@ impl Part {
 /// stress memory.
 fn elements_of(
     body: &Body,
-    scaling: &Scaling,
+    (scaling, dynamic): (&Scaling, &DynamicScaling),
     tets: &[u32],
     nodes: &dyn Fn(u32) -> [u32; 4],
     config: &Config,
 ) -> Box<dyn LawElements> {
-    let of = (body, scaling, config.averaged_pressure);
+    let of = (body, scaling, dynamic, config.averaged_pressure);
     let elastic = config.relaxation.is_none();
     match body.material(tets[0] as usize).law() {
         Law::NeoHookean(_) if elastic => Box::new(Blocks::<NeoHookean, 2, 0>::new(of, tets, nodes)),
@@ -256,21 +256,22 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Blocks<M, K, T> {
     /// Fills the blocks. Neighbours go to the same lane of different blocks, so that consecutive
     /// lanes of a block seldom add to the same node.
     fn new(
-        (body, scaling, averaged_pressure): (&Body, &Scaling, bool),
+        (body, scaling, dynamic, averaged_pressure): (&Body, &Scaling, &DynamicScaling, bool),
         tets: &[u32],
         nodes: &dyn Fn(u32) -> [u32; 4],
     ) -> Self {
         let mut blocks = vec![Block::empty(); tets.len().div_ceil(WIDTH)];
         let count = blocks.len();
-        let mut quarter_mass = vec![[0.0; WIDTH]; count];
+        let mut borne = vec![Borne::EMPTY; count];
         for (at, &t) in tets.iter().enumerate() {
             let grams = f64::from(body.material(t as usize).density_g_mm3()) * body.mesh.volume_mm3(t as usize);
-            quarter_mass[at % count][at / count] = (0.25 * grams * scaling.factor(t)) as f32;
+            let quarter_mass = (0.25 * grams * scaling.factor(t)) as f32;
+            borne[at % count].put(at / count, quarter_mass, scaling.omega2(t), dynamic);
             let tissue = (&body.shape(t as usize), body.material(t as usize), scaling.factor(t));
             blocks[at % count].put::<M>(at / count, tissue, nodes(t));
         }
         let strains = vec![Strain::NONE; if averaged_pressure { count } else { 0 }];
-        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; count], blocks, strains, quarter_mass, law: PhantomData }
+        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; count], blocks, strains, borne, law: PhantomData }
     }
 }
 
@@ -280,9 +281,9 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
         kernel: Kernel,
         &Forcing { fade, dynamic, .. }: &Forcing,
         (u, averages): (&[Quad; NODES], &[f32; NODES]),
-        (sums, added): (&mut [Quad; NODES], &mut Vec<(u32, f32)>),
+        (sums, added): (&mut [Quad; NODES], &mut Vec<Added>),
     ) -> PassReport {
-        let Self { blocks, memory, strains, quarter_mass, law } = self;
+        let Self { blocks, memory, strains, borne, law } = self;
         kernel.run(&mut Forces::<M, K, T> {
             blocks,
             memory,
@@ -291,7 +292,7 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
             strains,
             averages,
             sums,
-            quarter_mass,
+            borne,
             dynamic,
             added,
             law: *law,

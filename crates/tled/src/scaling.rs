@@ -12,6 +12,8 @@ use trepan_soft::{Body, element_omega2};
 /// Factors on the density of every tetrahedron, and the added mass.
 pub(crate) struct Scaling {
     factors: Vec<f64>,
+    /// ω² of every tetrahedron before scaling, 1/ms².
+    omega2: Vec<f64>,
     /// Largest ω² of an element after scaling, 1/ms².
     pub stiffest: f64,
     /// Added mass, as a share of the body's mass.
@@ -26,7 +28,7 @@ impl Scaling {
         let omega2: Vec<f64> = (0..count).map(|t| element_omega2(&body.shape(t), body.material(t))).collect();
         let stiffest = omega2.iter().copied().fold(0.0, f64::max);
         if most <= 0.0 {
-            return Self { factors: vec![1.0; count], stiffest, added: 0.0 };
+            return Self { factors: vec![1.0; count], omega2, stiffest, added: 0.0 };
         }
         let mass = |t: usize| f64::from(body.material(t).density_g_mm3()) * body.mesh.volume_mm3(t);
         let total: f64 = (0..count).map(mass).sum();
@@ -45,12 +47,17 @@ impl Scaling {
         }
         let factors: Vec<f64> = omega2.iter().map(|w| (w / target).max(1.0)).collect();
         let added = (0..count).map(|t| mass(t) * (factors[t] - 1.0)).sum::<f64>() / total;
-        Self { factors, stiffest: stiffest.min(target), added }
+        Self { factors, omega2, stiffest: stiffest.min(target), added }
     }
 
     /// Factor on the density of a tetrahedron.
     pub fn factor(&self, tet: u32) -> f64 {
         self.factors[tet as usize]
+    }
+
+    /// ω² of a tetrahedron with its scaled mass, 1/ms².
+    pub fn omega2(&self, tet: u32) -> f32 {
+        (self.omega2[tet as usize] / self.factors[tet as usize]) as f32
     }
 
     /// Inertial mass of every node, g.

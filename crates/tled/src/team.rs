@@ -11,6 +11,7 @@
 //! # Practice
 //! Workers spin for a few microseconds after a round, then yield, then sleep.
 
+use crate::dynamic_scaling::Added;
 use crate::force_slots::ForceSlots;
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, Quiet};
@@ -41,6 +42,10 @@ pub(crate) enum Work {
     Average,
     /// Element forces.
     Forces(Forcing),
+    /// Velocity changes of a substep before they are averaged.
+    Predict(Update),
+    /// Forces that average the velocity changes.
+    Oppose(Update),
     /// Motion of the nodes.
     Update(Update),
 }
@@ -148,14 +153,22 @@ impl Team {
 
     /// Adds the mass for stiffened elements to their nodes, or takes it away again.
     pub fn weigh(&self, adds: bool) {
-        let nodes = self.nodes();
         for part in &self.shared.parts {
-            lock(part).added().for_each(
-                |(place, grams)| {
-                    if adds { nodes.add_mass(place, grams) } else { nodes.take_mass(place) }
-                },
-            );
+            lock(part).added().flatten().filter(|a| a.grams > 0.0).for_each(|Added { node, grams, .. }| match adds {
+                true => self.nodes().add_mass(node as usize, grams),
+                false => self.nodes().take_mass(node as usize),
+            });
         }
+    }
+
+    /// Forces that average the velocity changes over the elements, stiffened ones included.
+    pub fn oppose(&mut self, update: Update) {
+        self.compute(Work::Predict(update));
+        self.compute(Work::Oppose(update));
+        for part in &self.shared.parts {
+            lock(part).added().for_each(|added| self.nodes().oppose_added(added, &update));
+        }
+        self.nodes().count_opposed();
     }
 
     /// Number of elements, and number of awake elements.
@@ -207,7 +220,7 @@ impl Shared {
         match work {
             Work::Volumes(_) | Work::Forces(_) => self.parts.len(),
             Work::Average => self.force_slots.node_groups().div_ceil(RUN),
-            Work::Update(_) => self.nodes.u.len().div_ceil(RUN),
+            Work::Predict(_) | Work::Oppose(_) | Work::Update(_) => self.nodes.u.len().div_ceil(RUN),
         }
     }
 
@@ -242,6 +255,8 @@ impl Shared {
             Work::Volumes(quiet) => lock(&self.parts[number]).volumes(kernel, quiet, nodes, force_slots),
             Work::Average => force_slots.average(run(number, force_slots.node_groups())),
             Work::Forces(how) => lock(&self.parts[number]).forces(kernel, &how, nodes, force_slots),
+            Work::Predict(update) => nodes.predict(run(number, nodes.u.len()), force_slots, &update),
+            Work::Oppose(update) => nodes.oppose(run(number, nodes.u.len()), &update),
             Work::Update(update) => nodes.update(run(number, nodes.u.len()), force_slots, &update),
         }
     }

@@ -51,7 +51,7 @@ fn a_step_never_allocates() {
             body.fixed.clear();
         }
         // Some elements stiffen beyond what twice their mass makes up for.
-        let config = Config { threads, dynamic_mass_scaling: 2.0, ..Config::default() };
+        let config = Config { threads, dynamic_mass_scaling: 2.0, selective_mass_scaling: true, ..Config::default() };
         let mut tled = Tled::new(&body, &config).unwrap();
         let dt = tled.stable_dt_ms() * 2.5;
         tled.step(&loads, dt);

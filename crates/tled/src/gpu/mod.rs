@@ -124,6 +124,7 @@ pub struct GpuTled {
 impl GpuTled {
     /// Takes a body at rest to the device.
     pub fn new(gpu: &Gpu, body: &Body, config: &Config) -> Result<Self, GpuTledError> {
+        let config = &Config { selective_mass_scaling: false, ..*config };
         let (base, masses, scaling) = Base::of(body, config)?;
         refuse(&base)?;
         let (layout, averages) = (&base.layout, config.averaged_pressure);
