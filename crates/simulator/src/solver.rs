@@ -133,6 +133,7 @@ impl Ingredients {
         Config {
             mass_scaling: MASS_ADDED,
             dynamic_mass_scaling: self.dynamic_mass_scaling,
+            selective_mass_scaling: self.selective_mass_scaling,
             averaged_pressure: self.element == Element::LockingFree,
             relaxation: self.relaxation(),
             threads: self.threads.unwrap_or(1),
@@ -222,7 +223,7 @@ mod tests {
         let place = spring;
         let height = |solver: &dyn SoftSolver| place.mean(|node| solver.positions()[node as usize]).z;
         let start = height(&*solver);
-        spring.offset_mm = 4.0 - start;
+        spring.offset_mm = 2.5 - start;
         let loads = Loads { contacts: spring.into(), ..Loads::default() };
         let (mut force, dt_ms) = (0.0, solver.stable_dt_ms());
         (0..(60.0 / dt_ms) as u32).for_each(|_| force = solver.step(&loads, dt_ms).contact_n);
@@ -236,6 +237,9 @@ mod tests {
         assert_eq!((ran.name, ran.device, ran.remarks().len()), ("tled", SolverDevice::Cpu, 0));
         assert!(usual[0] > 0.5 && usual[1] > 0.01, "{usual:?}");
         assert_eq!(pressed(&Ingredients { threads: Some(2), ..plain.clone() }).0, usual, "threads change no bit");
+        let short_steps = Ingredients { selective_mass_scaling: false, ..plain.clone() };
+        let change = pressed(&short_steps).0[1] / usual[1] - 1.0;
+        assert!(change != 0.0 && change.abs() < 0.05, "{change}");
         let softer = [
             Ingredients { element: Element::LockingFree, ..plain.clone() },
             Ingredients { relaxation: Relaxation::Prony, ..plain.clone() },

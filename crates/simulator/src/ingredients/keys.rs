@@ -167,6 +167,16 @@ pub const KEYS: &[Key] = &[
         ..Key::of(Part::Tled)
     },
     Key {
+        name: "selective-mass-scaling",
+        values: switches,
+        about: "accelerations are averaged over the elements, which makes a short step twice as long",
+        usual: Some("on"),
+        compared: || vec!["off".into()],
+        get: |i| Some(switch_name(i.selective_mass_scaling).into()),
+        set: |i, text| switch(text).map(|on| i.selective_mass_scaling = on),
+        ..Key::of(Part::Tled)
+    },
+    Key {
         name: "element",
         values: names::<Element>,
         about: "tetrahedra; locking-free: averaged nodal pressure (Joldes et al. 2009)",

@@ -40,6 +40,8 @@ pub struct Ingredients {
     pub still_mm: f32,
     /// Largest factor on the mass of a stiffened element, without unit; 1 = none.
     pub dynamic_mass_scaling: f32,
+    /// Averages accelerations over the elements, for longer steps.
+    pub selective_mass_scaling: bool,
     /// Tetrahedral element.
     pub element: Element,
     /// Constitutive law of each tissue class, in the order of [`TissueClass::ALL`].
@@ -116,6 +118,7 @@ impl Default for Ingredients {
             solver: None,
             still_mm: 0.0,
             dynamic_mass_scaling: DYNAMIC_MASS_SCALING,
+            selective_mass_scaling: true,
             element: Element::Plain,
             laws: [Law::NeoHookean; TissueClass::ALL.len()],
             relaxation: Relaxation::Off,

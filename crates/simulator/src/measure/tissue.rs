@@ -125,8 +125,8 @@ pub struct Measurement {
     pub error_mm: f64,
     /// Force of the tool and its error, the worse of push and slide.
     pub force: TissueForce,
-    /// Mean number of substeps of a step.
-    pub substeps: f64,
+    /// Cost of a step over that of one plain substep.
+    pub step_cost: f64,
     /// Mean time step, ms.
     pub dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
@@ -138,7 +138,7 @@ pub struct Measurement {
 pub fn cost(at: usize, choices: &[Tissue], found: &[Measurement], scene: &Scene) -> f64 {
     let (choice, of) = (&choices[at], &found[at]);
     let of_step = match choice.solver {
-        "tled" => of.substeps,
+        "tled" => of.step_cost,
         _ => of.ns / found[unit(choices)].ns,
     };
     of_step * dt_ms(scene, choice) / of.dt_ms
@@ -199,15 +199,21 @@ impl<'a> Brains<'a> {
     fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn SoftSolver>, SessionError> {
         match Method::named(choice.solver) {
             Some(method) => method.build(&self.body(mesh)).map_err(brain_error),
-            None => Ok(Box::new(self.tled(mesh, self.element == Element::LockingFree, DYNAMIC_MASS_SCALING)?)),
+            None => Ok(Box::new(self.tled(mesh, self.element == Element::LockingFree, true)?)),
         }
     }
 
-    /// Creates TLED with the settings of a session; with or without averaged nodal pressure.
-    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, dynamic_mass_scaling: f32) -> Result<Tled, SessionError> {
-        let damping = self.damping;
-        let config =
-            Config { mass_scaling: MASS_ADDED, dynamic_mass_scaling, damping, averaged_pressure, ..Config::default() };
+    /// Creates TLED with or without averaged nodal pressure, and with the mass that a session adds
+    /// dynamically and selectively or without.
+    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, as_session: bool) -> Result<Tled, SessionError> {
+        let config = Config {
+            mass_scaling: MASS_ADDED,
+            dynamic_mass_scaling: if as_session { DYNAMIC_MASS_SCALING } else { 1.0 },
+            selective_mass_scaling: as_session,
+            damping: self.damping,
+            averaged_pressure,
+            ..Config::default()
+        };
         Tled::new(&self.body(mesh), &config).map_err(brain_error)
     }
 
@@ -240,8 +246,8 @@ struct Pushed {
     surfaces: [Surroundings; 3],
     /// Force of the tool at the end of each, N.
     forces_n: [f64; 2],
-    /// Mean number of substeps of a step.
-    substeps: f64,
+    /// Cost of a step over that of one plain substep.
+    step_cost: f64,
     /// Mean time step, ms.
     dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
@@ -265,7 +271,7 @@ impl Push {
         let ends = [0.0, slide.length_mm].map(|mm| on_surface(slide.place + mm * slide.along(normal)));
         let middle = 0.5 * (ends[0] + ends[1]);
         let mesh = refined(&brains.domain, truth, middle, normal)?;
-        let solver = &mut brains.tled(&mesh, true, 1.0)?;
+        let solver = &mut brains.tled(&mesh, true, false)?;
         let truth = run(slide, normal, ends, &mesh, solver, LONGEST_MS[0])?;
         Ok(Self { slide: *slide, normal, ends, truth })
     }
@@ -281,7 +287,7 @@ impl Push {
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
         let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
-        self.found(&mesh, &mut brains.tled(&mesh, averaged_pressure, DYNAMIC_MASS_SCALING)?, LONGEST_MS[0])
+        self.found(&mesh, &mut brains.tled(&mesh, averaged_pressure, true)?, LONGEST_MS[0])
     }
 
     /// Measures every choice, in the order of `brains`.
@@ -304,8 +310,8 @@ impl Push {
 
     fn found(&self, mesh: &TetMesh, solver: &mut dyn SoftSolver, longest_ms: f32) -> Result<Measurement, SessionError> {
         let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
-        let Pushed { substeps, dt_ms, ns, .. } = found;
-        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), substeps, dt_ms, ns })
+        let Pushed { step_cost, dt_ms, ns, .. } = found;
+        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), step_cost, dt_ms, ns })
     }
 
     /// Distance of this ground truth from a finer one, 95th percentile over the places, mm.
@@ -388,7 +394,7 @@ fn run(
     Ok(Pushed {
         surfaces,
         forces_n,
-        substeps: f64::from(substeps) / f64::from(steps),
+        step_cost: solver.relative_cost() * f64::from(substeps) / f64::from(steps),
         dt_ms: f64::from(now) / f64::from(steps),
         ns,
     })

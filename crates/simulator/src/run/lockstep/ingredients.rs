@@ -25,7 +25,8 @@ const PROBE: u64 = 600;
 /// Every key at once.
 const ALL: &str = "rigid=god-object-sphere,shaft=on,shading=on,bone-friction=0.3,vibration=off,element=locking-free,\
                    law=ogden,law.grey=mooney-rivlin,relaxation=solid-and-fluid,threads=2,device=gpu,surface-pressure=2,\
-                   search=hashed-grid,friction=0.3,folds=on,dynamic-mass-scaling=4,support=anchored";
+                   search=hashed-grid,friction=0.3,folds=on,dynamic-mass-scaling=4,\
+                   selective-mass-scaling=off,support=anchored";
 
 /// A plate of bone 6 mm thick with a hole of 24 mm, 2 mm over a block of brain.
 fn case() -> Case {

@@ -66,7 +66,14 @@ pub fn brain([shear, compressibility, density, share, bound]: [f64; 5]) -> Mater
 
 /// Settings of the solver as `--quality auto` runs it.
 pub fn config(relaxation: Relaxation) -> Config {
-    Config { mass_scaling: 0.01, dynamic_mass_scaling: 16.0, averaged_pressure: true, relaxation, ..Config::default() }
+    Config {
+        mass_scaling: 0.01,
+        dynamic_mass_scaling: 16.0,
+        selective_mass_scaling: true,
+        averaged_pressure: true,
+        relaxation,
+        ..Config::default()
+    }
 }
 
 fn run(values: &[f64]) -> [f64; OUTPUTS] {

@@ -186,6 +186,7 @@ fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, [f64; 2])> {
     let config = Config {
         mass_scaling: MASS_ADDED * scene.heavier,
         dynamic_mass_scaling: 16.0,
+        selective_mass_scaling: true,
         averaged_pressure: true,
         damping: Damping::Rate(damping_per_ms()?),
         ..Config::default()
