@@ -37,19 +37,89 @@ use trepan_budget::Scene;
 /// What the rows are called.
 const SCENE: &str = "drill, open, press the brain";
 
+const SECOND: &str = "second head: drill, open, press the brain";
+
 /// One part for each setup.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let part = |candidate: Candidate| {
-        Part::new(candidate.name, move |scope, findings: &mut Findings| match row(scope, &candidate) {
-            Ok(row) => findings.rows.push(row),
-            Err(fault) => {
-                findings.rows.push(Row::new(candidate.name, "not run").with("fault", format!("{fault:#}")));
-                findings.gates.push(Gate::at_least(format!("{}: runs", candidate.name), 0.0, 1.0));
-            }
+        Part::new(candidate.name, move |scope, findings| {
+            reported(findings, candidate.name, row(scope, &candidate).map(|row| (row, Vec::new())));
         })
     };
-    let budget = Part::new("error budget of drilling", bone::budget);
-    setups::all(scope).into_iter().map(part).chain([budget]).collect()
+    let others = [
+        Part::new("error budget of drilling", bone::budget),
+        Part::new("truth of two sizes", |scope, findings| reported(findings, "truth of two sizes", two_sizes(scope))),
+        Part::new("second head", |scope, findings| match setups::second_head() {
+            Some(images) => reported(findings, "second head", second_head(scope, &images)),
+            None => findings.rows.push(Row::new(SECOND, "not run").with("why", "TREPAN_DATA names no second head")),
+        }),
+    ];
+    setups::all(scope).into_iter().map(part).chain(others).collect()
+}
+
+/// Adds what a part found, or why it did not run.
+fn reported(findings: &mut Findings, name: &str, found: Result<(Row, Vec<Gate>)>) {
+    match found {
+        Ok((row, gates)) => {
+            findings.rows.push(row);
+            findings.gates.extend(gates);
+        }
+        Err(fault) => {
+            findings.rows.push(Row::new(name, "not run").with("fault", format!("{fault:#}")));
+            findings.gates.push(Gate::at_least(format!("{name}: runs"), 0.0, 1.0));
+        }
+    }
+}
+
+/// The truth beside the same with half as many tetrahedra.
+fn two_sizes(scope: Scope) -> Result<(Row, Vec<Gate>)> {
+    let truth = Prepared::open(scope, setups::truth(scope).flags, None)?.run(&mut |_| {})?;
+    let coarser = Prepared::open(scope, setups::coarser_truth(scope), Some(truth.site))?.run(&mut |_| {})?;
+    let (errors, percent) = (Errors::between(&coarser, &truth), apart_percent(&coarser, &truth));
+    let row = errors
+        .named()
+        .into_iter()
+        .fold(Row::new("truth of two sizes", "half the size"), |row, (name, value)| row.metric(name, value));
+    let what = "truth: force on the brain of its two sizes apart, percent";
+    Ok((row.metric("force_apart_percent", percent), vec![Gate::at_most(what, percent, 5.0)]))
+}
+
+/// Root mean square of the difference of the forces on the brain over that of the forces, percent.
+fn apart_percent(ride: &Ride, truth: &Ride) -> f64 {
+    let ticks = (0..truth.forces.len()).filter(|&t| truth.probing[t] && !ride.on_bone[t] && !truth.on_bone[t]);
+    let [apart, all] = ticks.fold([0.0; 2], |[apart, all], t| {
+        let (a, b) = (ride.forces[t], truth.forces[t]);
+        [apart + f64::from(a.distance_squared(b)), all + f64::from(b.length_squared())]
+    });
+    100.0 * (apart / all).sqrt()
+}
+
+/// What `auto` takes on another head, beside a truth of its own. Bone is judged on the built-in
+/// head only.
+fn second_head(scope: Scope, images: &str) -> Result<(Row, Vec<Gate>)> {
+    let truth = Prepared::open(scope, &format!("{} {images}", setups::truth(scope).flags), None)?.run(&mut |_| {})?;
+    ensure!(truth.opened(), "the truth did not open the skull: nothing can be held against it");
+    let auto = Prepared::open(scope, &format!("--quality auto {images}"), Some(truth.site))?.run(&mut |_| {})?;
+    let errors = Errors::between(&auto, &truth);
+    let over = worst([errors.tissue_over, errors.shown_p95_mm / Scene::default().displacement_mm]);
+    let cpu_s_per_s = auto.cpu_s.iter().sum::<f64>() / auto.seconds;
+    let row = Row::new(SECOND, "auto").with("setup", auto.setup.as_str());
+    let row = errors.named().into_iter().fold(row, |row, (name, value)| row.metric(name, value));
+    let row = row
+        .metric("error_over_tolerance", over)
+        .metric("cpu_s_per_s", cpu_s_per_s)
+        .metric("solver_faults", auto.solver_faults())
+        .metric("truth_solver_faults", truth.solver_faults());
+    let gates = vec![
+        Gate::at_most("second head, auto: worst error of the brain over its default tolerance", over, 1.0),
+        Gate::at_most("second head, auto: processor time, cores", cpu_s_per_s, 2.0),
+        Gate::at_most(
+            "second head, truth: nodes limited, elements inverted and ms skipped",
+            truth.solver_faults(),
+            0.0,
+        ),
+    ];
+    Ok((row, gates))
 }
 
 /// The finest run of this process: every part needs it, and it is the same for all.

@@ -22,6 +22,26 @@ pub fn truth(scope: Scope) -> Candidate {
     Candidate { name: "truth", flags }
 }
 
+/// The same with half as many tetrahedra: how far the two are apart says how sure the truth is.
+pub fn coarser_truth(scope: Scope) -> &'static str {
+    scope.pick(
+        "--quality fine --spacing-mm 0.5 --tets 12500 --opening-refinement 4",
+        "--quality fine --spacing-mm 0.4 --tets 25000 --opening-refinement 4",
+    )
+}
+
+/// Flags of another head's images, where `TREPAN_DATA` names the folder of them.
+pub fn second_head() -> Option<String> {
+    let home = std::path::PathBuf::from(std::env::var_os("TREPAN_DATA")?).join("head-second");
+    let file = |path: &str| Some(home.join(path)).filter(|file| file.is_file());
+    let [ct, mri, mask] = [
+        file("ct/ct_head_hu.nii.gz")?,
+        file("mri/mri_t1_in_ct_grid.nii.gz")?,
+        file("mri/brainmask_in_ct_grid.nii.gz")?,
+    ];
+    Some(format!("--ct {} --mri {} --labels {}", ct.display(), mri.display(), mask.display()))
+}
+
 /// Every setup, auto and the presets first.
 pub fn all(scope: Scope) -> Vec<Candidate> {
     let mut setups = vec![

@@ -95,12 +95,13 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens the built-in case by a setup's flags. The hand goes along the plan at a site, else at
-    /// the session's own.
+    /// Opens the built-in case by a setup's flags, or the images that these name. The hand goes along
+    /// the plan at a site, else at the session's own.
     pub fn open(scope: Scope, flags: &str, site: Option<Site>) -> Result<Self> {
         let before_mb = held_mb();
         let Vec3 { x, y, z } = OPENING;
-        let flags = format!("integrated --headless --frames-per-second 0 --opening {x},{y},{z} {flags}");
+        let opening = if flags.contains("--ct") { String::new() } else { format!("--opening {x},{y},{z}") };
+        let flags = format!("integrated --headless --frames-per-second 0 {opening} {flags}");
         let options = Options::try_parse_from(flags.split_whitespace())?;
         let session = Session::open(Program::Integrated, options, case::inputs())?;
         let site = site.unwrap_or(session.scene().site);
