@@ -12,7 +12,7 @@
 //! v̄⁺ = v̄ - γ p Σ wᵢ²/mᵢ     p = k (d + dt c⁺) + b c⁺     c = v̄ - v_tool
 //! p = max(0, (k (d + dt c) + b c) / (1 + γ (k dt + b) Σ wᵢ²/mᵢ))
 //! ```
-//! The tool goes on during the step: were it to stand, a moving one would be `k dt v_tool` too deep.
+//! The tool goes on during the step: were it to stand, the force would lack `k dt v_tool`.
 //! At rest v̄ is what undoes p in a step, so p = k d: stiffness, masses and step move the way there
 //! and not the end. With the mesh's own ω and q = γ (k dt + b) Σ wᵢ²/mᵢ the step stays stable for
 //! `dt² ω² ≤ 4 + 2 q`: never for less than without the spring, however stiff and damped it is.

@@ -40,11 +40,6 @@ pub trait SoftSolver: Send {
         self.stable_dt_ms()
     }
 
-    /// Cost of a step over that of a plain step of this solver on the same mesh, without unit.
-    fn relative_cost(&self) -> f64 {
-        1.0
-    }
-
     /// Maker of a solver of the same body for a processor that is too slow: it costs less and errs
     /// more in motion. `None` where there is none.
     fn cheaper(&self) -> Option<MakeSolver> {

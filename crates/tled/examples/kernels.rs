@@ -21,14 +21,9 @@ fn main() -> Result<(), BodyError> {
     runs.push(("locking-free", Config { averaged_pressure: true, ..plain }));
     runs.push(("locking-free, two threads", Config { threads: 2, averaged_pressure: true, ..plain }));
     runs.push(("Prony terms", Config { relaxation: Relaxation::BRAIN, ..plain }));
-    runs.push((
-        "averaged pressure and Prony",
-        Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain },
-    ));
-    runs.push((
-        "the same, selective mass scaling",
-        Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, selective_mass_scaling: true, ..plain },
-    ));
+    let both = Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain };
+    runs.push(("averaged pressure and Prony", both));
+    runs.push(("the same, selective mass scaling", Config { selective_mass_scaling: true, ..both }));
     let mut solvers = Vec::new();
     for (name, config) in &runs {
         solvers.push((*name, Tled::new(&body, config)?, Vec::new()));

@@ -73,6 +73,13 @@ impl Base {
         self.config.safety * self.bound.elements_ms() * self.longer()
     }
 
+    /// Cost of simulated time with averaged accelerations over that without; 1 where they would not
+    /// be used.
+    pub fn averaged_cost(&self) -> f64 {
+        let is_used = self.config.safety * self.bound.elements_ms() < LONG_ENOUGH_MS;
+        if is_used { averaging::COST / f64::from(averaging::LONGER) } else { 1.0 }
+    }
+
     /// Factor on the stable step of averaged accelerations.
     fn longer(&self) -> f32 {
         if self.config.selective_mass_scaling { averaging::LONGER } else { 1.0 }

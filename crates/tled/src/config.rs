@@ -31,9 +31,9 @@ pub struct Config {
     /// elements do not shorten the step of the whole body then; weight does not change.
     /// The simulators use 16. On the graphics card the step is shortened instead.
     pub dynamic_mass_scaling: f32,
-    /// Averages accelerations over the elements (selective mass scaling): steps are twice as long,
-    /// equilibria stay, and short waves are slower. Costs about a quarter of a step. Not used where
-    /// the step is over 0.6 ms without it, nor on the graphics card.
+    /// Averages accelerations over the elements (selective mass scaling): steps are √3 times as
+    /// long, equilibria stay, and short waves are slower. Costs about a quarter of a step. Not used
+    /// where the step is over 0.6 ms without it, nor on the graphics card.
     pub selective_mass_scaling: bool,
     /// Speed limit of a node, mm/ms (m/s). A surgeon's hand stays under 1. Faster nodes are clamped
     /// and counted.

@@ -108,7 +108,7 @@ mod tests {
     /// Computed by hand.
     ///
     /// ω² of 4 + 8 with a limit of 4 + 2 needs twice the mass; 4 + 92 may have three times and is
-    /// left with 32. Averaged, a small ω² of 0.5 has a quarter of its mass averaged; grown by 2.5 it
+    /// left with 32. Averaged, an ω² of 0.5 has a quarter of its mass averaged; grown by 2.5 it
     /// needs half of it averaged and no mass, by 11.5 twice its mass, all of it averaged.
     #[test]
     fn a_stiffened_element_gets_the_mass_for_its_growth() {

@@ -195,8 +195,8 @@ impl Nodes {
         }
     }
 
-    /// What the nodes need in this substep. Unneeded fields are neither read nor written: the update
-    /// is limited by memory bandwidth, about 100 bytes a node.
+    /// What the nodes need in this substep. Unneeded fields are neither read nor written, since
+    /// memory bandwidth limits the update, about 100 bytes a node.
     fn flags(&self, update: &Update) -> Flags {
         Flags {
             anything_pushes: self.is_pushed.load(Relaxed),
@@ -275,7 +275,7 @@ impl Nodes {
         }
     }
 
-    /// Finds the forces against the predicted changes of some nodes that average them over elements.
+    /// Finds the forces that average the predicted changes of some nodes over elements.
     pub fn oppose(&self, places: Range<usize>, update: &Update) {
         let (Some(averaging), [_, gain]) = (&self.averaging, update.keep_and_gain()) else { return };
         for place in places {

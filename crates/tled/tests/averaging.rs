@@ -1,4 +1,4 @@
-//! Selective mass scaling: the same equilibria, momentum and slow motion in steps twice as long.
+//! Selective mass scaling: the same equilibria, momentum and slow motion in longer steps.
 
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
@@ -37,9 +37,9 @@ fn noise(i: usize) -> f32 {
 }
 
 #[test]
-fn steps_are_twice_as_long_and_the_tissue_rests_where_it_did() {
+fn steps_are_longer_and_the_tissue_rests_where_it_did() {
     let [mut plain, mut averaged] = solver(&block(true), Config { dynamic_mass_scaling: 16.0, ..Config::default() });
-    assert!((averaged.stable_dt_ms() / plain.stable_dt_ms() - 2.0).abs() < 1e-5);
+    assert!((averaged.stable_dt_ms() / plain.stable_dt_ms() - 3f32.sqrt()).abs() < 1e-5);
     let loads = pressed(2.0);
     let forces = [&mut plain, &mut averaged].map(|tled| {
         let (mut now_ms, mut force_n) = (0.0, 0.0);

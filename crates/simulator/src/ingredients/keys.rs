@@ -169,7 +169,7 @@ pub const KEYS: &[Key] = &[
     Key {
         name: "selective-mass-scaling",
         values: switches,
-        about: "accelerations are averaged over the elements, which makes a short step twice as long",
+        about: "accelerations are averaged over the elements, which makes a short step √3 times as long",
         usual: Some("on"),
         compared: || vec!["off".into()],
         get: |i| Some(switch_name(i.selective_mass_scaling).into()),

@@ -125,7 +125,7 @@ pub struct Measurement {
     pub error_mm: f64,
     /// Force of the tool and its error, the worse of push and slide.
     pub force: TissueForce,
-    /// Cost of a step over that of one plain substep.
+    /// Cost of a step over that of one plain substep of the same length.
     pub step_cost: f64,
     /// Mean time step, ms.
     pub dt_ms: f64,
@@ -195,21 +195,23 @@ impl<'a> Brains<'a> {
         Ok(Self { shape, domain, choices: choices.to_vec(), meshes, element, damping: Damping::Rate(damping) })
     }
 
-    /// Creates the solver of a choice.
-    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn SoftSolver>, SessionError> {
-        match Method::named(choice.solver) {
-            Some(method) => method.build(&self.body(mesh)).map_err(brain_error),
-            None => Ok(Box::new(self.tled(mesh, self.element == Element::LockingFree, true)?)),
+    /// Creates the solver of a choice; also returns its cost in a session over that without
+    /// averaged accelerations.
+    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<(Box<dyn SoftSolver>, f64), SessionError> {
+        if let Some(method) = Method::named(choice.solver) {
+            return Ok((method.build(&self.body(mesh)).map_err(brain_error)?, 1.0));
         }
+        let tled = self.tled(mesh, self.element == Element::LockingFree, true)?;
+        let cost = tled.averaged_cost();
+        Ok((Box::new(tled), cost))
     }
 
     /// Creates TLED with or without averaged nodal pressure, and with the mass that a session adds
-    /// dynamically and selectively or without.
+    /// to stiffened elements or without. Accelerations are not averaged: equilibria stay.
     fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, as_session: bool) -> Result<Tled, SessionError> {
         let config = Config {
             mass_scaling: MASS_ADDED,
             dynamic_mass_scaling: if as_session { DYNAMIC_MASS_SCALING } else { 1.0 },
-            selective_mass_scaling: as_session,
             damping: self.damping,
             averaged_pressure,
             ..Config::default()
@@ -246,8 +248,8 @@ struct Pushed {
     surfaces: [Surroundings; 3],
     /// Force of the tool at the end of each, N.
     forces_n: [f64; 2],
-    /// Cost of a step over that of one plain substep.
-    step_cost: f64,
+    /// Mean number of substeps of a step.
+    substeps: f64,
     /// Mean time step, ms.
     dt_ms: f64,
     /// Computing time per tetrahedron and step, ns.
@@ -287,7 +289,9 @@ impl Push {
         averaged_pressure: bool,
     ) -> Result<Measurement, SessionError> {
         let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
-        self.found(&mesh, &mut brains.tled(&mesh, averaged_pressure, true)?, LONGEST_MS[0])
+        let mut tled = brains.tled(&mesh, averaged_pressure, true)?;
+        let cost = tled.averaged_cost();
+        self.found(&mesh, (&mut tled, cost), LONGEST_MS[0])
     }
 
     /// Measures every choice, in the order of `brains`.
@@ -303,14 +307,20 @@ impl Push {
             let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
             let mesh = refined.as_ref().or_else(alike).ok_or_else(|| brain_error("a mesh is missing"))?;
             let longest_ms = LONGEST_MS[usize::from(choice.solver == "corotational")];
-            self.found(mesh, &mut *brains.solver(choice, mesh)?, longest_ms)
+            let (mut solver, cost) = brains.solver(choice, mesh)?;
+            self.found(mesh, (&mut *solver, cost), longest_ms)
         };
         brains.choices.iter().map(one).collect()
     }
 
-    fn found(&self, mesh: &TetMesh, solver: &mut dyn SoftSolver, longest_ms: f32) -> Result<Measurement, SessionError> {
+    fn found(
+        &self,
+        mesh: &TetMesh,
+        (solver, cost): (&mut dyn SoftSolver, f64),
+        longest_ms: f32,
+    ) -> Result<Measurement, SessionError> {
         let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
-        let Pushed { step_cost, dt_ms, ns, .. } = found;
+        let (step_cost, dt_ms, ns) = (cost * found.substeps, found.dt_ms, found.ns);
         Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), step_cost, dt_ms, ns })
     }
 
@@ -394,7 +404,7 @@ fn run(
     Ok(Pushed {
         surfaces,
         forces_n,
-        step_cost: solver.relative_cost() * f64::from(substeps) / f64::from(steps),
+        substeps: f64::from(substeps) / f64::from(steps),
         dt_ms: f64::from(now) / f64::from(steps),
         ns,
     })

@@ -95,8 +95,8 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens the built-in case by a setup's flags, or the images that these name. The hand goes along
-    /// the plan at a site, else at the session's own.
+    /// Opens the built-in case by a setup's flags, or the images that these name. The hand goes
+    /// along the plan at a site, else at the session's own.
     pub fn open(scope: Scope, flags: &str, site: Option<Site>) -> Result<Self> {
         let before_mb = held_mb();
         let Vec3 { x, y, z } = OPENING;

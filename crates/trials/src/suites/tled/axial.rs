@@ -192,12 +192,8 @@ fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, [f64; 2])> {
         ..Config::default()
     };
     let mut solver = Tled::new(&body, &config)?;
-    let touch = trepan_deformable::Config {
-        friction: scene.friction,
-        shaft: true,
-        stiffness_per_mm2: scene.stiffness_per_mm2,
-        ..Default::default()
-    };
+    let (friction, stiffness_per_mm2) = (scene.friction, scene.stiffness_per_mm2);
+    let touch = trepan_deformable::Config { friction, shaft: true, stiffness_per_mm2, ..Default::default() };
     let mut collision = TissueCollision::new(mesh, &scene.tool, &touch)?;
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
     let (mut out, mut times_us, mut all) = (TissueStep::default(), Vec::new(), Vec::new());
