@@ -1,6 +1,6 @@
 // Forces of all springs on the nodes they touch, each implicit, one after the other, with the
-// velocities v that nodes would have without the springs to come: d = d_rest + Σ w u·n    p =
-// max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m)) What slides across the
+// velocities v that nodes would have without the springs to come: d = d_rest + Σ w u·n    c = v̄ -
+// v_tool    p = max(0, (k (d + dt c) + b c) / (1 + gain (k dt + b) Σ w²/m)) What slides across the
 // normal of a pressing spring is damped, node by node. Springs of one node that no other touches
 // follow side by side, then planes, no two of the same node; they damp sliding by how deep it is.
 // Depth from which sliding along a plane is damped as strongly as the normal velocity.

@@ -268,6 +268,18 @@ mod tests {
         (x.to_vec(), sum)
     }
 
+    /// A tool 0.3 mm deep goes on at 0.04 mm/ms; after 0.5 ms it will be 0.02 mm deeper. By hand.
+    #[test]
+    fn a_moving_tool_presses_as_deep_as_it_will_be() {
+        let mut press = spring([2.0, 0.5], Vec3::Z, &[(0, 1.0)]);
+        (press.offset_mm, press.tool_normal_velocity) = (0.3, -0.04);
+        let free = |_: u32| FreeNode { position: Vec3::ZERO, velocity: Vec3::ZERO, inverse_mass: 1.0 };
+        let step = Gain { dt_ms: 0.5, gain_ms: 0.5 };
+        let force = ImplicitSprings::on_nodes(1).press(&listed(&[press]), step, free, |_, _| {});
+        let exact = (2.0 * 0.32 + 0.5 * 0.04) / (1.0 + 0.5 * (2.0 * 0.5 + 0.5));
+        assert!((force - exact).abs() < 1e-6, "{force} N for {exact}");
+    }
+
     /// Presses a spring of k by 2 mm on a mass's own spring K. The force is `k K/(k + K)` times 2
     /// mm, however stiff and damped it is.
     #[test]

@@ -82,9 +82,12 @@ impl Averaging {
 /// Stiffening that an element's share of averaging covers from the start.
 const COVERED: f32 = 2.0;
 
+/// Largest share at rest. Below 1 no motion is without mass of its own: Q is definite.
+const MOST: f32 = 0.99;
+
 /// Share of its mass by which an element is averaged, from its ω² and the largest one, 1/ms².
 pub(crate) fn share(omega2: f32, stiffest: f32) -> f32 {
-    (COVERED * omega2 / stiffest).min(1.0)
+    (COVERED * omega2 / stiffest).min(MOST)
 }
 
 /// Cost of a step over that of one without, in a session.

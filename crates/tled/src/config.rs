@@ -4,8 +4,8 @@ use crate::{Kernel, Relaxation};
 use trepan_geometry::Vec3;
 use trepan_soft::BodyError;
 
-/// Settings of the TLED solver. The simulators use the defaults, except for a `mass_scaling` of a
-/// hundredth, or of a tenth where the processor is too slow.
+/// Settings of the TLED solver. The simulators take a `mass_scaling` of a hundredth, or of a tenth
+/// where the processor is too slow, and dynamic and selective mass scaling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// Damping of motion.
@@ -32,8 +32,8 @@ pub struct Config {
     /// The simulators use 16. On the graphics card the step is shortened instead.
     pub dynamic_mass_scaling: f32,
     /// Averages accelerations over the elements (selective mass scaling): steps are √3 times as
-    /// long, equilibria stay, and short waves are slower. Costs about a quarter of a step. Not used
-    /// where the step is over 0.6 ms without it, nor on the graphics card.
+    /// long, equilibria stay, and short waves are slower. Costs a third of a step in a session. Not
+    /// used where the step is over 0.6 ms without it, nor on the graphics card.
     pub selective_mass_scaling: bool,
     /// Speed limit of a node, mm/ms (m/s). A surgeon's hand stays under 1. Faster nodes are clamped
     /// and counted.

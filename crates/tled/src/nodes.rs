@@ -270,7 +270,9 @@ impl Nodes {
                 true => None,
                 false => self.kicked(place, state, force_slots, update, keep_and_gain, flags),
             };
-            let change = kicked.map_or(Vec4::ZERO, |[carried, velocity]| velocity - carried);
+            // What is not finite must not spread to neighbours before the update resets it.
+            let change = kicked.map_or(Vec4::W, |[carried, velocity]| velocity - carried);
+            let change = if change.is_finite() { change } else { Vec4::W };
             self.changes.set(place, change.to_array());
         }
     }

@@ -52,7 +52,7 @@ impl SoftSolver for Tled {
         self.base.next_dt_ms(self.growth)
     }
 
-    /// The same with a [`Config::mass_scaling`] of a tenth: steps of twice the length.
+    /// The same with a [`Config::mass_scaling`] of a tenth: longer steps.
     fn cheaper(&self) -> Option<MakeSolver> {
         let config = Config { mass_scaling: CHEAPER_MASS_SCALING, ..self.base.config };
         if self.base.config.mass_scaling >= CHEAPER_MASS_SCALING {
@@ -172,7 +172,7 @@ impl Tled {
         })
     }
 
-    /// Stable (critical) time step without safety factor, ms.
+    /// Stable (critical) time step without safety factor and averaged accelerations, ms.
     pub fn bound_ms(&self) -> f32 {
         self.base.bound.at_rest_ms
     }
@@ -236,7 +236,8 @@ impl Tled {
         self.base.elapsed_ms = 0.0;
     }
 
-    /// Does one pass of a step on the present state, for benches. A step is all passes in order.
+    /// Does one pass of a step on the present state, for benches. A step without averaged
+    /// accelerations is all passes in order.
     pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
         let mut report = StepReport::default();
         match pass {

@@ -58,7 +58,7 @@ fn ns_per_tet_step(clock: &Clock, ingredients: &Ingredients) -> f64 {
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
     let material = ingredients.laws[0].material(TissueClass::Brain, Material::BRAIN.young_mpa() as f32);
     let body = Body::uniform(mesh, fixed, material);
-    let config = Config { threads: 1, still_mm: 0.0, ..ingredients.config() };
+    let config = Config { threads: 1, still_mm: 0.0, selective_mass_scaling: false, ..ingredients.config() };
     let mut solver = Tled::new(&body, &config).expect("a split box is a valid mesh");
     // A small load: under the whole weight every element of a bare box would stiffen.
     let loads = Loads { gravity: Vec3::NEG_Z * (0.02 * units::GRAVITY_MM_PER_MS2), ..Loads::default() };

@@ -39,7 +39,7 @@ const SCENE: &str = "drill, open, press the brain";
 
 const SECOND: &str = "second head: drill, open, press the brain";
 
-/// One part for each setup.
+/// One part for each setup, and those of the truth and of a second head.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let part = |candidate: Candidate| {
         Part::new(candidate.name, move |scope, findings| {

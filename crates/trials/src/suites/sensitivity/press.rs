@@ -101,13 +101,13 @@ fn run(values: &[f64]) -> [f64; OUTPUTS] {
     let (mut force, mut greatest) = (0.0, 0.0f32);
     while time_ms < END_MS {
         let dt_ms = solver.next_dt_ms();
-        time_ms += dt_ms;
         let goes = time_ms < GO_MS;
         contact.offset_mm = PRESS_MM * (time_ms / GO_MS).min(1.0) - EDGE_MM;
         contact.tool_normal_velocity = if goes { -PRESS_MM / GO_MS } else { 0.0 };
         loads.contacts = contact.into();
         force = solver.step(&loads, dt_ms).contact_n;
         greatest = greatest.max(force);
+        time_ms += dt_ms;
     }
     [greatest, force].map(f64::from)
 }
