@@ -22,7 +22,8 @@
 //! side less `3 dt² C` is at least `3 M + 9 R ≥ 12 R`: the stable step is √3 times as long as
 //! without, whatever touches the nodes (without C: twice). Springs that share nodes are taken one
 //! after the other, which this leaves out: stiff ones along one normal, on elements of half a mm,
-//! turned elements over where those of sessions, one for each node, do not.
+//! turned elements over at √3 too, in three of eight pushes; those of sessions, one for each node,
+//! did not in an operation on elements of that size. Errors of a choice are measured without.
 //!
 //! # Sources
 //! L. Olovsson, K. Simonsson, M. Unosson: Selective mass scaling for explicit finite element
