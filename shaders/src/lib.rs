@@ -56,6 +56,8 @@ pub const TLED_FORCES: [&str; 5] = [
 ];
 /// Volume change of every tetrahedron, and its mean around the nodes.
 pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("node_groups.wgsl")];
+/// Nodal forces of the triangles of a membrane.
+pub const TLED_MEMBRANE: &str = tled!("membrane.wgsl");
 /// The contact springs on the tissue surface.
 pub const TLED_PRESS: &str = tled!("fluid.wgsl", "gather.wgsl", "press.wgsl");
 /// Sums the forces at nodes and integrates their motion.

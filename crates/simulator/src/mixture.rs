@@ -9,7 +9,7 @@
 use crate::tissue_class::TissueClass;
 use std::collections::BTreeMap;
 use trepan_mesh::lattice::LabelledMesh;
-use trepan_soft::{Body, Bound, Material};
+use trepan_soft::{Body, Bound, Material, Membrane};
 
 /// Shares of a volume by class, in the order of [`TissueClass::ALL`].
 pub(crate) type Shares = [f32; TissueClass::ALL.len()];
@@ -65,6 +65,7 @@ pub fn body_of(labelled: &LabelledMesh, of_classes: Vec<Material>, bound: Bound,
         materials: materials(of_classes, &mixtures, bound),
         material_of_tet: codes.into_iter().map(|code| code - 1).collect(),
         anchors: Vec::new(),
+        membrane: Membrane::default(),
     }
 }
 

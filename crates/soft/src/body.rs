@@ -1,6 +1,6 @@
 //! A body: tetrahedra, what they are made of, and which nodes do not move.
 
-use crate::{Anchor, Material, MaterialError, Shape};
+use crate::{Anchor, Material, MaterialError, Membrane, Shape};
 use glam::DVec3;
 use trepan_geometry::Vec3;
 use trepan_mesh::{Csr, TetMesh, Topology};
@@ -18,6 +18,9 @@ pub struct Body {
     pub material_of_tet: Vec<u8>,
     /// Springs to places at rest, at most one a node; the last one of a node counts.
     pub anchors: Vec<Anchor>,
+    /// Membrane on the surface; [`trepan-tled`](https://docs.rs/trepan-tled) has it, the rivals here
+    /// have not.
+    pub membrane: Membrane,
 }
 
 /// Why a body was refused.
@@ -102,6 +105,12 @@ pub enum BodyError {
     /// One of several parts of a held body is not held.
     #[error("nothing holds the part with mesh.tets[{0}]: fix or anchor a node of it, or drop the part")]
     Loose(usize),
+    /// A membrane that is none, or not on the body's nodes.
+    #[error(
+        "membrane.triangles[{0}] is not right: it needs three nodes of the mesh that span an area, and the membrane a \
+         finite stiffness that is not negative"
+    )]
+    Membrane(usize),
     /// A static solver was given a body that can float away.
     #[error(
         "fixed does not hold the part with mesh.tets[{0}]: it needs at least 3 nodes there that are not on one line"
@@ -139,7 +148,8 @@ impl Body {
     /// A body of one material.
     pub fn uniform(mesh: TetMesh, fixed: Vec<u32>, material: Material) -> Self {
         let material_of_tet = vec![0; mesh.tets.len()];
-        Self { material_of_tet, mesh, fixed, materials: vec![material], anchors: Vec::new() }
+        let (anchors, membrane) = (Vec::new(), Membrane::default());
+        Self { material_of_tet, mesh, fixed, materials: vec![material], anchors, membrane }
     }
 
     /// Material of a tetrahedron.
@@ -149,7 +159,7 @@ impl Body {
 
     /// The same body of one material throughout.
     pub fn with_material(self, material: Material) -> Self {
-        Self { anchors: self.anchors, ..Self::uniform(self.mesh, self.fixed, material) }
+        Self { anchors: self.anchors, membrane: self.membrane, ..Self::uniform(self.mesh, self.fixed, material) }
     }
 
     /// For each material the number of the first one with its bulk modulus, within 0.1 %. Averaged
@@ -195,6 +205,13 @@ impl Body {
         let is_wrong = |anchor: &&Anchor| anchor.node as usize >= nodes || !anchor.is_sound();
         if let Some((index, anchor)) = self.anchors.iter().enumerate().find(|(_, anchor)| is_wrong(anchor)) {
             return Err(BodyError::Anchor { index, node: anchor.node, nodes });
+        }
+        let is_soft = (0.0..f32::INFINITY).contains(&self.membrane.shear_n_per_mm);
+        let spans = |t: usize| self.membrane.shape(t, &self.mesh.positions).area_mm2 > 1e-9;
+        let is_there = |corners: &[u32; 3]| corners.iter().all(|&n| (n as usize) < nodes);
+        let mut triangles = self.membrane.triangles.iter().enumerate();
+        if let Some((wrong, _)) = triangles.find(|(t, corners)| !(is_soft && is_there(corners) && spans(*t))) {
+            return Err(BodyError::Membrane(wrong));
         }
         if let Some(&node) = self.fixed.iter().find(|&&n| n as usize >= nodes) {
             return Err(BodyError::FixedRange { node, nodes });
@@ -334,6 +351,12 @@ mod tests {
         assert!(matches!(fault, Err(BodyError::Anchor { index: 1, node: 27, nodes: 27 })));
         let fault = Body { anchors: vec![Anchor { along: -1.0, ..Anchor::default() }], ..cube() }.check();
         assert!(matches!(fault, Err(BodyError::Anchor { index: 0, .. })));
+        for (triangle, shear_n_per_mm) in
+            [([0, 1, 27], 0.1), ([0, 1, 1], 0.1), ([0, 1, 4], -0.1), ([0, 1, 4], f32::NAN)]
+        {
+            let membrane = Membrane { triangles: vec![triangle], shear_n_per_mm };
+            assert_eq!(Body { membrane, ..cube() }.check(), Err(BodyError::Membrane(0)));
+        }
         assert!(matches!(broken(|b| _ = b.material_of_tet.pop()), BodyError::MaterialCount { found: 47, tets: 48 }));
         assert!(matches!(broken(|b| b.material_of_tet[5] = 1), BodyError::MaterialRange { tet: 5, index: 1, .. }));
         assert!(matches!(broken(|b| b.materials.clear()), BodyError::MaterialRange { tet: 0, materials: 0, .. }));

@@ -36,6 +36,8 @@ pub struct Tangent {
     /// Node groups over which pressure is averaged; empty where it is not.
     groups: Vec<Group>,
     anchors: Vec<Anchor>,
+    /// Stiffness of the membrane between two nodes, N/mm.
+    membrane: Vec<(u32, u32, DMat3)>,
     rest: Vec<DVec3>,
     fixed: Vec<bool>,
     factor: Factor,
@@ -78,11 +80,16 @@ impl Tangent {
         let mean_mm = (body.mesh.total_mm3() / elements.len() as f64).cbrt();
         let element_stiffness = laws.iter().map(|law| law.moduli().0).fold(0.0, f64::max) * mean_mm;
         let rest = body.mesh.positions.iter().map(|p| p.as_dvec3()).collect();
+        let mut membrane = Vec::new();
+        for t in 0..body.membrane.triangles.len() {
+            body.membrane.stiffness(t, &body.mesh.positions, |a, b, block| membrane.push((a, b, block)));
+        }
         Some(Self {
             elements,
             laws,
             groups,
             anchors: body.anchors.clone(),
+            membrane,
             rest,
             fixed,
             factor,
@@ -177,8 +184,9 @@ impl Tangent {
         pressures
     }
 
-    /// Adds anchors and springs of one node, such as planes.
+    /// Adds the membrane as if nothing wrinkled, anchors, and springs of one node, such as planes.
     fn add_nodal(&mut self, u: &[DVec3], loads: &Loads, pressing: &[NodalContact]) {
+        self.membrane.iter().for_each(|&(a, b, block)| self.factor.add(a, b, block));
         for &Anchor { node, normal, along, across, in_fluid, .. } in &self.anchors {
             let place = self.rest[node as usize] + u[node as usize];
             let held = 1.0 - f64::from(in_fluid * loads.fluid.dryness(place.as_vec3()));

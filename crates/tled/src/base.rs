@@ -65,7 +65,19 @@ impl Base {
             supported: body.is_supported(),
             elapsed_ms: 0.0,
         };
-        Ok((base, stiffness.masses_g().to_vec(), scaling))
+        let mut masses = stiffness.masses_g().to_vec();
+        for (corners, grams) in body.membrane.triangles.iter().zip(base.membrane_masses_g(body)) {
+            corners.iter().for_each(|&n| masses[n as usize] += grams);
+        }
+        Ok((base, masses, scaling))
+    }
+
+    /// Mass, g, that each corner of each triangle of the membrane needs for the stable step.
+    pub fn membrane_masses_g(&self, body: &Body) -> impl Iterator<Item = f64> {
+        let share = if self.config.selective_mass_scaling { 1.0 / 12.0 } else { 0.25 };
+        let of_stiffness = share * f64::from(self.stable_dt_ms()).powi(2);
+        let membrane = &body.membrane;
+        (0..membrane.triangles.len()).map(move |t| of_stiffness * membrane.stiffest(t, &body.mesh.positions))
     }
 
     /// Longest step that is stable with margin at rest, ms.

@@ -187,11 +187,14 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 let moduli = M::moduli(&constants);
                 let gained = stiffness(&stress, moduli, &d, (volume_change, slope))
                     - stiffness_at_rest(M::at_rest(&constants), moduli);
-                let mut grown = L::load(&block.omega2, part) * gained;
-                if (L::load(&self.borne[i].growth, part) - grown).not_positive() > 0 {
-                    grown = self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.borne[i]), self.added);
+                let grown = L::load(&block.omega2, part) * gained;
+                growth = if (L::load(&self.borne[i].growth, part) - grown).not_positive() > 0 {
+                    self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.borne[i]), self.added)
+                } else {
+                    // An element that bears its growth by its share of averaging needs no shorter step.
+                    grown.smaller(self.dynamic.limit)
                 }
-                growth = grown.larger(growth);
+                .larger(growth);
                 if T > 0 {
                     relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
                 }
@@ -253,12 +256,12 @@ fn relax<L: Lane, const T: usize>(
 }
 
 #[inline(always)]
-fn minus<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
+pub(crate) fn minus<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn load<L: Lane, const N: usize>(rows: &[[f32; WIDTH]; N], part: usize) -> [L; N] {
+pub(crate) fn load<L: Lane, const N: usize>(rows: &[[f32; WIDTH]; N], part: usize) -> [L; N] {
     let mut loaded = [L::splat(0.0); N];
     for k in 0..N {
         loaded[k] = L::load(&rows[k], part);

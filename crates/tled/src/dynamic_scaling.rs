@@ -71,7 +71,7 @@ impl DynamicScaling {
     pub const NONE: Self = Self { limit: f32::INFINITY, stiffest: 1.0, most: 1.0, averages: false };
 
     /// Lists the mass for the nodes of stiffened elements in some lanes, from the growth of their
-    /// ω²; returns the growth that is left.
+    /// ω²; returns the growth that is left, at most `limit` for what is not stiffened.
     #[cold]
     #[inline(never)]
     pub fn weigh<L: Lane>(
@@ -85,8 +85,13 @@ impl DynamicScaling {
         grown.store(&mut left, part);
         let lanes = part * L::LANES..(part + 1) * L::LANES;
         for (lane, at) in lanes.enumerate() {
-            // False for NaN. There is room for every corner of every element.
-            if left[at] > borne.growth[at] && added.len() + 4 <= added.capacity() {
+            // Also for NaN.
+            if !(left[at] > borne.growth[at]) {
+                left[at] = left[at].min(self.limit);
+                continue;
+            }
+            // There is room for every corner of every element.
+            if added.len() + 4 <= added.capacity() {
                 let borne_now = self.stiffest + self.limit;
                 let now = borne.share[at] * borne_now - borne.growth[at] + left[at];
                 let factor = (now / borne_now).clamp(1.0, self.most);

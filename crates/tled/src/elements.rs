@@ -8,6 +8,7 @@ use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, PartGroups, Quiet};
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
+use crate::sheet::sheets;
 use crate::team::{Team, Work};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
@@ -40,23 +41,28 @@ impl Elements {
         let node_groups = NodeGroups::of(body, layout, config.averaged_pressure);
         let inverse_volume =
             if config.averaged_pressure { node_groups.inverse_volumes(body, layout) } else { Vec::new() };
+        let sheets = sheets(&body.membrane, layout, PART);
         let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
         let tets_of: Vec<&[u32]> = of_one_law.flat_map(|tets| tets.chunks(PART)).collect();
         let groups_of = |t: u32| node_groups.of_tet(body, layout, t);
-        let owned: Vec<Vec<u32>> = tets_of.iter().map(|tets| sorted(tets.iter().flat_map(|&t| groups_of(t)))).collect();
+        let group_at = |node: u32| node_groups.any_at(layout.place_of[node as usize]);
+        let corners =
+            |sheet: &Vec<u32>| sheet.iter().flat_map(|&t| body.membrane.triangles[t as usize]).collect::<Vec<_>>();
+        let groups_of_sheet = |sheet: &Vec<u32>| sorted(corners(sheet).into_iter().map(group_at));
+        let of_tets = tets_of.iter().map(|tets| sorted(tets.iter().flat_map(|&t| groups_of(t))));
+        let owned: Vec<Vec<u32>> = of_tets.chain(sheets.iter().map(groups_of_sheet)).collect();
         let (force_slots, slots) = ForceSlots::of(&owned, &node_groups, layout.node_at.len(), inverse_volume);
-        let part = |((tets, groups), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
-            let places = groups.iter().map(|&s| node_groups.place_of[s as usize]).collect();
-            Part::of(
-                body,
-                (scaling, &dynamic),
-                tets,
-                &groups_of,
-                PartGroups { node_groups: groups, places, slots },
-                config,
-            )
-        };
-        let parts = tets_of.iter().zip(owned).zip(slots).map(part).collect();
+        let places = |groups: &[u32]| groups.iter().map(|&s| node_groups.place_of[s as usize]).collect();
+        let mut of_parts = owned.into_iter().zip(slots).map(|(node_groups, slots)| PartGroups {
+            places: places(&node_groups),
+            node_groups,
+            slots,
+        });
+        let scaling = (scaling, &dynamic);
+        let of_tets = tets_of.iter().zip(of_parts.by_ref());
+        let mut parts: Vec<Part> =
+            of_tets.map(|(tets, groups)| Part::of(body, scaling, tets, &groups_of, groups, config)).collect();
+        parts.extend(sheets.iter().zip(of_parts).map(|(sheet, groups)| Part::of_sheet(body, sheet, &group_at, groups)));
         Self {
             team: Team::of(parts, nodes, force_slots, config.kernel.resolved(), config.threads),
             averaged_pressure: config.averaged_pressure,
@@ -166,7 +172,7 @@ fn sorted(values: impl Iterator<Item = u32>) -> Vec<u32> {
 mod tests {
     use super::*;
     use trepan_soft::simd::Kernel;
-    use trepan_soft::{Fluid, Material, boxes};
+    use trepan_soft::{Fluid, Material, Membrane, boxes};
 
     #[test]
     fn kernels_give_the_same_bits_for_every_law_and_the_sum_of_all_forces_vanishes() {
@@ -186,6 +192,8 @@ mod tests {
         let mut mixed = Body::uniform(mesh, vec![], Material::BRAIN);
         mixed.materials.extend([stiff, mooney, Material::BRAIN_OGDEN, stiffening]);
         mixed.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t * 7 % 5) as u8);
+        let triangles = trepan_mesh::Surface::of(&mixed.mesh).triangles;
+        mixed.membrane = Membrane { triangles, shear_n_per_mm: 0.1 };
         compare(&mixed, false, Relaxation::NONE);
         compare(&mixed, true, Relaxation::BRAIN);
     }

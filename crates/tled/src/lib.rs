@@ -59,6 +59,7 @@ mod principal;
 mod relaxation;
 mod scaling;
 mod settle;
+mod sheet;
 mod stiffness;
 mod symmetric;
 mod team;

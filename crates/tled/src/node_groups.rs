@@ -58,6 +58,11 @@ impl NodeGroups {
         })
     }
 
+    /// One of the node groups at a place.
+    pub fn any_at(&self, place: u32) -> u32 {
+        self.place_of.partition_point(|&p| p < place) as u32
+    }
+
     /// Inverse volume of every group, 1/mm³.
     pub fn inverse_volumes(&self, body: &Body, layout: &Layout) -> Vec<f32> {
         let mut volumes = vec![0.0; self.place_of.len()];

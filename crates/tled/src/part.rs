@@ -27,6 +27,7 @@ use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhof
 use crate::nodes::Nodes;
 use crate::relaxation::{Fade, PRONY_TERMS};
 use crate::scaling::Scaling;
+use crate::sheet::{self, SheetBlock, SheetForces};
 use glam::Vec4;
 use std::marker::PhantomData;
 use trepan_soft::simd::Kernel;
@@ -122,19 +123,30 @@ impl Part {
         config: &Config,
     ) -> Self {
         let nodes = |t: u32| groups_of(t).map(|s| groups.node_groups.partition_point(|&o| o < s) as u32);
-        let zero = vec![[0.0; 4]; groups.places.len()];
+        let elements = elements_of(body, (scaling, dynamic), tets, &nodes, config);
+        Self::around(elements, tets.len(), groups)
+    }
+
+    /// A part at rest.
+    fn around(elements: Box<dyn LawElements>, tets: usize, groups: PartGroups) -> Self {
         Self {
-            elements: elements_of(body, (scaling, dynamic), tets, &nodes, config),
+            elements,
             u: bytemuck::zeroed_box(),
             sums: bytemuck::zeroed_box(),
             volumes: bytemuck::zeroed_box(),
-            added: Vec::with_capacity(4 * tets.len()),
+            added: Vec::with_capacity(4 * tets),
             report: PassReport::default(),
-            tets: tets.len(),
-            anchor: zero,
+            tets,
+            anchor: vec![[0.0; 4]; groups.places.len()],
             quiet_ms: 0.0,
             groups,
         }
+    }
+
+    /// Creates a part of triangles of the body's membrane; `group_at` gives a node group of a node.
+    pub fn of_sheet(body: &Body, triangles: &[u32], group_at: &dyn Fn(u32) -> u32, groups: PartGroups) -> Self {
+        let number = |node: u32| groups.node_groups.partition_point(|&o| o < group_at(node)) as u32;
+        Self::around(Box::new(Sheet(sheet::blocks(body, triangles, number))), 0, groups)
     }
 
     /// Computes the elements' volume changes, unless the part sleeps.
@@ -305,5 +317,27 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
 
     fn memory(&mut self) -> &mut [f32] {
         self.memory.as_flattened_mut().as_flattened_mut().as_flattened_mut()
+    }
+}
+
+/// Triangles of a membrane.
+struct Sheet(Vec<SheetBlock>);
+
+impl LawElements for Sheet {
+    fn forces(
+        &mut self,
+        kernel: Kernel,
+        _: &Forcing,
+        (u, _): (&[Quad; NODES], &[f32; NODES]),
+        (sums, _): (&mut [Quad; NODES], &mut Vec<Added>),
+    ) -> PassReport {
+        kernel.run(&mut SheetForces { blocks: &self.0, u, sums })
+    }
+
+    /// A membrane has no volume.
+    fn volumes(&mut self, _: Kernel, _: &[Quad; NODES], _: &mut [f32; NODES]) {}
+
+    fn memory(&mut self) -> &mut [f32] {
+        &mut []
     }
 }

@@ -157,7 +157,7 @@ impl Tled {
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
         let (base, masses, scaling) = Base::of(body, config)?;
         let averages = base.config.selective_mass_scaling;
-        let averaging = averages.then(|| Averaging::of(body, &base.layout, &scaling, base.bound.stiffest));
+        let averaging = averages.then(|| Averaging::of(body, &base, &scaling));
         let nodes = Nodes::of(body, &base.layout, &masses, averaging);
         Ok(Self {
             gravity: Vec3::ZERO,

@@ -4,7 +4,7 @@
 use trepan_contact::{NodalContact, PlaneContact};
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, adapter_for_tests as device};
-use trepan_soft::{Anchor, Body, Fluid, Loads, Material, SoftSolver, boxes};
+use trepan_soft::{Anchor, Body, Fluid, Loads, Material, Membrane, SoftSolver, boxes};
 use trepan_tled::gpu::{GpuTled, GpuTledError, WithSpare};
 use trepan_tled::{Config, Relaxation, Tled};
 
@@ -167,12 +167,14 @@ fn every_law_with_averaged_pressure_and_relaxation_agrees_with_the_processor() {
 }
 
 #[test]
-fn a_body_of_every_law_at_once_with_scaled_masses_agrees_too() {
+fn a_body_of_every_law_at_once_with_a_membrane_and_scaled_masses_agrees_too() {
     let Some(gpu) = device() else { return };
     let mut body = body();
     body.materials =
         vec![Material::BRAIN, KIRCHHOFF, MOONEY, TWO_TERMS, STIFFENING, Material::TUMOUR, Material::VENTRICLE];
     body.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t / 17 % 7) as u8);
+    let triangles = trepan_mesh::Surface::of(&body.mesh).triangles;
+    body.membrane = Membrane { triangles, shear_n_per_mm: 0.02 };
     let config = Config {
         averaged_pressure: true,
         relaxation: FADING,

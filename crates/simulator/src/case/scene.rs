@@ -12,7 +12,7 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_soft::{Anchor, Body, Material};
+use trepan_soft::{Anchor, Body, Material, Membrane};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.
@@ -95,6 +95,7 @@ impl RestBrain {
             mesh: self.mesh.clone(),
             fixed,
             anchors,
+            membrane: Membrane::default(),
             materials: mixture::materials(of_classes, &self.mixtures, mixture::BOUND),
             material_of_tet: self.class_of_tet.iter().map(|code| code.saturating_sub(1)).collect(),
         }

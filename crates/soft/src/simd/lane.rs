@@ -83,6 +83,13 @@ pub trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
         }
     }
 
+    /// The smaller of each lane and `most`; `most` for NaN.
+    #[inline(always)]
+    fn smaller(self, most: f32) -> Self {
+        let zero = Self::splat(0.0);
+        zero - (zero - self).at_least(-most)
+    }
+
     /// The largest of its lanes.
     #[inline(always)]
     fn largest(self) -> f32 {

@@ -52,7 +52,7 @@ impl Forces {
         let more = Buffer::from_slice(gpu, "more", if wants_more { &more } else { &[[0.0; 4]] })?;
         let relaxes = !config.relaxation.is_none();
         let memory = Buffer::<f32>::zeroed(gpu, "memory", if relaxes { 6 * PRONY_TERMS * count } else { 1 })?;
-        let slots = Buffer::zeroed(gpu, "forces", 4 * count)?;
+        let slots = Buffer::zeroed(gpu, "forces", topology.runs.slots.len())?;
         let (mut laws, mut first) = (Vec::new(), 0u32);
         for tets in layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b)) {
             let range = Buffer::from_slice(gpu, "range", &[[first, tets.len() as u32, 0, 0]])?;

@@ -5,6 +5,7 @@
 //! volumes  elements ──▶ change of volume                          (only with averaged pressure)
 //! node_groups    change of volume ──▶ its mean around each node  (only with averaged pressure)
 //! forces   elements ──▶ slots, one a corner, sorted by node
+//! membrane triangles ──▶ slots                                   (only with a membrane)
 //! press    touched nodes ──▶ forces of the contact springs       (only where something touches)
 //! update   slots ──▶ node, in their order; v⁺, u⁺
 //! ```
@@ -44,6 +45,7 @@
 
 mod device_state;
 mod forces;
+mod membrane;
 mod pass;
 mod press;
 mod spare;
@@ -108,6 +110,7 @@ pub struct GpuTled {
     /// Passes of averaged pressure.
     volumes: Option<[Pass; 2]>,
     forces: Forces,
+    membrane: Option<Pass>,
     press: Press,
     update: Pass,
     readback: Readback,
@@ -133,6 +136,8 @@ impl GpuTled {
         let topology = Topology::new(gpu, body, layout, &node_groups, averages)?;
         let forces = Forces::new(gpu, (body, layout, &scaling), config, &state, &topology)?;
         let volumes = || volumes::passes(gpu, (body, layout, &node_groups), &state, &topology, &forces);
+        let sheet = || membrane::pass(gpu, body, &state, &topology, &forces);
+        let membrane = (!topology.sheet_corners.is_empty()).then(sheet).transpose()?;
         let press = Press::new(gpu, &state, &topology, &forces)?;
         let read = [state.u.raw(), state.v.raw(), state.noticed.raw(), press.pressure.raw()];
         Ok(Self {
@@ -149,6 +154,7 @@ impl GpuTled {
             base,
             state,
             forces,
+            membrane,
             press,
         })
     }
@@ -276,6 +282,7 @@ impl GpuTled {
     fn passes(&self, presses: bool) -> impl Iterator<Item = (&'static str, &Pass)> {
         let volumes = ["volumes", "node_groups"].into_iter().zip(self.volumes.iter().flatten());
         let forces = self.forces.laws.iter().map(|pass| ("forces", pass));
+        let forces = forces.chain(self.membrane.iter().map(|pass| ("membrane", pass)));
         let press = presses.then_some(("press", &self.press.pass));
         volumes.chain(forces).chain(press).chain([("update", &self.update)])
     }

@@ -22,8 +22,11 @@ pub(crate) struct Topology {
     pub starts: Buffer<u32>,
     /// By group: mean `J - 1` around it; one number without averaged pressure.
     pub volume_change: Buffer<f32>,
-    /// Slots of the corners, element by element, and the runs that they make, on this side.
+    /// Slots of the corners, element by element and then triangle by triangle, and the runs that
+    /// they make, on this side.
     pub runs: Runs,
+    /// Places of the corners of every triangle of the membrane, the first one again as the fourth.
+    pub sheet_corners: Vec<[u32; 4]>,
 }
 
 impl Topology {
@@ -35,10 +38,15 @@ impl Topology {
         averages: bool,
     ) -> Result<Self, GpuError> {
         let groups_of: Vec<[u32; 4]> = layout.tet_at.iter().map(|&t| node_groups.of_tet(body, layout, t)).collect();
-        let runs = node_groups.runs(groups_of.iter().flatten().copied(), layout.node_at.len());
+        let triangles: &[[u32; 3]] = if body.membrane.is_none() { &[] } else { &body.membrane.triangles };
+        let place_of = |node: u32| layout.place_of[node as usize];
+        let sheet_corners: Vec<[u32; 4]> = triangles.iter().map(|&[a, b, c]| [a, b, c, a].map(place_of)).collect();
+        let of_sheet = sheet_corners.iter().flatten().map(|&place| node_groups.any_at(place));
+        let owned = groups_of.iter().flatten().copied().chain(of_sheet);
+        let runs = node_groups.runs(owned, layout.node_at.len());
         let place = |group: u32| node_groups.place_of[group as usize];
         let mut corners: Vec<[u32; 4]> = groups_of.iter().map(|tet| tet.map(place)).collect();
-        corners.extend_from_slice(runs.slots.as_chunks().0);
+        corners.extend_from_slice(&runs.slots.as_chunks().0[..groups_of.len()]);
         if averages {
             corners.extend_from_slice(&groups_of);
         }
@@ -47,6 +55,7 @@ impl Topology {
             starts: Buffer::from_slice(gpu, "starts", &runs.of_places)?,
             volume_change: Buffer::zeroed(gpu, "volume_change", if averages { node_groups.place_of.len() } else { 1 })?,
             runs,
+            sheet_corners,
         })
     }
 }

@@ -30,7 +30,7 @@ pub(crate) fn passes(
     let quarter = |&t: &u32| (0.25 * body.mesh.volume_mm3(t as usize)) as f32;
     let quarters: Vec<f32> = layout.tet_at.iter().map(quarter).collect();
     let quarters = Buffer::from_slice(gpu, "quarters", &quarters)?;
-    let swollen = Buffer::<f32>::zeroed(gpu, "swollen", elements)?;
+    let swollen = Buffer::<f32>::zeroed(gpu, "swollen", elements + topology.sheet_corners.len())?;
     let starts = Buffer::from_slice(gpu, "group starts", &topology.runs.of_groups)?;
     let owners = Buffer::from_slice(gpu, "owners", &owners(&topology.runs))?;
     let inverse = Buffer::from_slice(gpu, "inverse volumes", &node_groups.inverse_volumes(body, layout))?;
