@@ -1,5 +1,6 @@
 //! Prepares a case for contact, drilling and deformation.
 
+use crate::case::anchors::Held;
 use crate::case::opening::{bare_brain, bone_of};
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
@@ -12,7 +13,7 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_soft::{Anchor, Body, Material, Membrane};
+use trepan_soft::{Body, Material, Membrane};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.
@@ -89,13 +90,15 @@ impl Scene {
 }
 
 impl RestBrain {
-    /// The body of the brain, of materials by tissue class, in their order.
-    pub fn body(&self, of_classes: Vec<Material>, fixed: Vec<u32>, anchors: Vec<Anchor>) -> Body {
+    /// The body of the brain, of materials by tissue class, in their order, with a membrane of a
+    /// shear stiffness on its surface, N/mm.
+    pub fn body(&self, of_classes: Vec<Material>, membrane: f32, Held { fixed, anchors, .. }: &Held) -> Body {
+        let triangles = if membrane > 0.0 { Surface::of(&self.mesh).triangles } else { Vec::new() };
         Body {
             mesh: self.mesh.clone(),
-            fixed,
-            anchors,
-            membrane: Membrane::default(),
+            fixed: fixed.clone(),
+            anchors: anchors.clone(),
+            membrane: Membrane { triangles, shear_n_per_mm: membrane },
             materials: mixture::materials(of_classes, &self.mixtures, mixture::BOUND),
             material_of_tet: self.class_of_tet.iter().map(|code| code.saturating_sub(1)).collect(),
         }

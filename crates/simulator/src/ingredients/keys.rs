@@ -204,6 +204,18 @@ pub const KEYS: &[Key] = &[
         ..Key::of(Part::Tled)
     },
     Key {
+        name: "pia-arachnoid",
+        values: || "off, or a shear stiffness up to 1 N/mm".into(),
+        about: "membrane in tension on the brain's surface; 0.12: human, published, at small strain",
+        usual: Some("off"),
+        presets: &[(Quality::Auto, PIA_ARACHNOID), (Quality::Fine, PIA_ARACHNOID)],
+        compared: || vec![PIA_ARACHNOID.into()],
+        realistic: Some(PIA_ARACHNOID),
+        get: |i| Some(off_or(i.pia_arachnoid_n_per_mm)),
+        set: |i, text| up_to(text, 1.0).map(|n_per_mm| i.pia_arachnoid_n_per_mm = n_per_mm),
+        ..Key::of(Part::Tled)
+    },
+    Key {
         name: "relaxation",
         values: names::<Relaxation>,
         about: "stress relaxation; prony: two terms of swine (Miller and Chinzei 2002); solid-and-fluid: three, \
@@ -307,6 +319,8 @@ pub const KEYS: &[Key] = &[
 /// both assumed.
 const FRICTION_ON_TISSUE: &str = "0.1";
 const FRICTION_ON_BONE: &str = "0.3";
+/// Shear stiffness of human pia-arachnoid, N/mm: `brain_membranes::PIA_SHEAR_STIFFNESS`.
+const PIA_ARACHNOID: &str = "0.12";
 /// The law that is fitted to human brain.
 const FITTED: &str = "stiffening";
 /// Total Lagrangian explicit dynamics.

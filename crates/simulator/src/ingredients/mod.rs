@@ -46,6 +46,8 @@ pub struct Ingredients {
     pub element: Element,
     /// Constitutive law of each tissue class, in the order of [`TissueClass::ALL`].
     pub laws: [Law; TissueClass::ALL.len()],
+    /// Shear stiffness of the pia-arachnoid on the brain's surface, N/mm; 0 = none.
+    pub pia_arachnoid_n_per_mm: f32,
     /// Stress relaxation.
     pub relaxation: Relaxation,
     /// Where the solver runs.
@@ -121,6 +123,7 @@ impl Default for Ingredients {
             selective_mass_scaling: true,
             element: Element::Plain,
             laws: [Law::NeoHookean; TissueClass::ALL.len()],
+            pia_arachnoid_n_per_mm: 0.0,
             relaxation: Relaxation::Off,
             device: SolverDevice::Cpu,
             threads: None,

@@ -81,7 +81,7 @@ mod tests {
             assert_ne!(made, usual, "{}", variant.setting());
             assert_eq!(all.iter().filter(|other| *other == variant).count(), 1, "{} once", variant.setting());
         }
-        assert_eq!(realistic().len(), 9);
+        assert_eq!(realistic().len(), 10);
     }
 
     #[test]

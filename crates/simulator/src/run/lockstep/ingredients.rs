@@ -26,7 +26,7 @@ const PROBE: u64 = 600;
 const ALL: &str = "rigid=god-object-sphere,shaft=on,shading=on,bone-friction=0.3,vibration=off,element=locking-free,\
                    law=ogden,law.grey=mooney-rivlin,relaxation=solid-and-fluid,threads=2,device=gpu,surface-pressure=2,\
                    search=hashed-grid,friction=0.3,folds=on,dynamic-mass-scaling=4,\
-                   selective-mass-scaling=off,support=anchored";
+                   selective-mass-scaling=off,pia-arachnoid=0.12,support=anchored";
 
 /// A plate of bone 6 mm thick with a hole of 24 mm, 2 mm over a block of brain.
 fn case() -> Case {
@@ -193,6 +193,7 @@ fn each_key_that_is_physical_changes_the_force_where_it_acts_and_replays() {
         ("law=ogden", [[0.0; 2], [0.002, 0.0]]),
         ("law=stiffening", [[0.0; 2], [0.002, 0.0]]),
         ("law.grey=ogden", [[0.0; 2], [0.0002, 0.0]]),
+        ("pia-arachnoid=0.12", [[0.0; 2], [0.002, 0.0]]),
         ("relaxation=prony", [[0.0; 2], [0.01, 0.0]]),
         ("relaxation=solid-and-fluid", [[0.0; 2], [0.002, 0.0]]),
         ("surface-pressure=10", [[0.0; 2], [0.01, 0.0]]),

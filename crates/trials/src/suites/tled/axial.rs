@@ -5,7 +5,8 @@
 //! The block of brain is 30 mm in radius and depth, fixed below and free above and at the side. The
 //! truth is `fixtures/fem/axial.csv` by `axial.py`: quadrilaterals in axial symmetry, quadratic
 //! displacements and discontinuous linear pressure, Newton's method, f64, augmented Lagrange
-//! against the exact ball; its two finest meshes agree within 0.3 percent. It has no friction. The
+//! against the exact ball, with and without a membrane on the top; its two finest meshes agree
+//! within 0.5 percent. It has no friction. The
 //! tool goes on its way as a hand does, at 40 mm/s, and rests at each depth. A tool that came on an
 //! oblique way without friction is where an upright one would be at the same place.
 //!
@@ -26,7 +27,7 @@ use trepan_geometry::{Pose, Quat, Tool, ToolState, Twist, Vec3, quantile};
 use trepan_mesh::{TetMesh, lattice};
 use trepan_simulator::Ingredients;
 use trepan_simulator::measure::tissue::MASS_ADDED;
-use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Tled};
 use trepan_volume::VoxelVolume;
 
@@ -48,6 +49,11 @@ const BRAIN_OVER_BLOCK: f32 = 6.0;
 /// The middle of the block's top lies so far from the tool's way, mm: no node is special.
 const ASIDE: Vec3 = Vec3::new(0.31, 0.17, 0.0);
 
+/// Published shear stiffness of human pia-arachnoid, N/mm: modulus times thickness.
+fn pia_arachnoid_n_per_mm() -> f32 {
+    trepan_measurements::brain_membranes::PIA_SHEAR_STIFFNESS.f32()
+}
+
 /// What is pressed, and how.
 struct Scene {
     name: &'static str,
@@ -63,6 +69,8 @@ struct Scene {
     stiffness_per_mm2: f32,
     /// Added mass over a session's share of it.
     heavier: f32,
+    /// Shear stiffness of the membrane on the whole surface, N/mm.
+    membrane_n_per_mm: f32,
 }
 
 impl Scene {
@@ -77,7 +85,10 @@ impl Scene {
             truth_mm: 4,
             stiffness_per_mm2: USUAL,
             heavier: 1.0,
+            membrane_n_per_mm: 0.0,
         };
+        let as_in_session = Self { heavier: BRAIN_OVER_BLOCK, ..probe };
+        let pia = Self { membrane_n_per_mm: pia_arachnoid_n_per_mm(), ..as_in_session };
         vec![
             Self { name: "rod of 2 mm", tool: rod(2.0), ..probe },
             Self { name: "rod of 5 mm", tool: rod(5.0), truth_mm: 8, ..probe },
@@ -91,13 +102,16 @@ impl Scene {
                 deepest_mm: 4,
                 ..probe
             },
-            Self { name: "probe, as heavy as in a session", heavier: BRAIN_OVER_BLOCK, ..probe },
+            Self { name: "probe, as heavy as in a session", ..as_in_session },
+            Self { name: "spatula, as heavy as in a session", tool: Tool::spatula(), truth_mm: 6, ..as_in_session },
+            Self { name: "probe on pia-arachnoid", heavier: 1.0, ..pia },
+            Self { name: "probe on pia-arachnoid, as heavy as in a session", ..pia },
+            Self { name: "rod of 5 mm on pia-arachnoid, as heavy as in a session", tool: rod(5.0), truth_mm: 8, ..pia },
             Self {
-                name: "spatula, as heavy as in a session",
+                name: "spatula on pia-arachnoid, as heavy as in a session",
                 tool: Tool::spatula(),
                 truth_mm: 6,
-                heavier: BRAIN_OVER_BLOCK,
-                ..probe
+                ..pia
             },
             Self { name: "probe, soft contact", stiffness_per_mm2: 0.05, ..probe },
             Self { name: "probe, stiff contact", stiffness_per_mm2: 0.2, ..probe },
@@ -182,7 +196,10 @@ fn damping_per_ms() -> Result<f32> {
 
 fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, [f64; 2])> {
     let fixed = boxes::nodes_where(mesh, |p| p.z < 0.5 * VOXEL_MM - BLOCK_MM);
-    let body = Body::uniform(mesh.clone(), fixed, Material::WHOLE_BRAIN);
+    let mut triangles = trepan_mesh::Surface::of(mesh).triangles;
+    triangles.retain(|t| t.iter().all(|&n| mesh.positions[n as usize].z > -0.01));
+    let membrane = Membrane { triangles, shear_n_per_mm: scene.membrane_n_per_mm };
+    let body = Body { membrane, ..Body::uniform(mesh.clone(), fixed, Material::WHOLE_BRAIN) };
     let config = Config {
         mass_scaling: MASS_ADDED * scene.heavier,
         dynamic_mass_scaling: 16.0,
@@ -251,18 +268,19 @@ fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, [f64; 2])> {
 }
 
 /// Forces of the truth on its finest mesh by radius and depth in mm, N.
-fn truths(radius_mm: f32) -> Result<Vec<f64>> {
+fn truths(radius_mm: f32, membrane_n_per_mm: f32) -> Result<Vec<f64>> {
     let path = trepan_fixtures::reference_solution("axial").with_extension("csv");
     let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
     let rows = text.lines().skip(1).map(|line| line.split(',').map(str::parse::<f64>).collect::<Result<Vec<_>, _>>());
     let rows = rows.collect::<Result<Vec<_>, _>>().context("a line of axial.csv")?;
-    let of = rows.iter().filter(|row| (row[0] - f64::from(radius_mm)).abs() < 1e-6);
-    Ok(of.map(|row| row[2]).collect())
+    let is = |a: f64, b: f32| (a - f64::from(b)).abs() < 1e-6;
+    let of = rows.iter().filter(|row| is(row[0], radius_mm) && is(row[1], membrane_n_per_mm));
+    Ok(of.map(|row| row[3]).collect())
 }
 
 fn judge(scene: &Scene, size: (usize, u32), findings: &mut Findings) -> Result<()> {
     let mesh = block(size)?;
-    let truth = truths(scene.tool.tip_radius_mm)?;
+    let truth = truths(scene.tool.tip_radius_mm, scene.membrane_n_per_mm)?;
     let (all, [collision_us, dt_ms]) = press(scene, &mesh)?;
     let edge = edge_mm(&mesh);
     let what = format!("{}, edge of {edge:.1} mm", scene.name);

@@ -16,7 +16,7 @@ use glam::Vec3;
 use std::sync::Arc;
 use trepan_budget::Quality;
 use trepan_contact::NodalContacts;
-use trepan_simulator::{Cache, Held, Ingredients, Plan, Program, RestBrain, Scene, SkullWall, TissueClass, open_case};
+use trepan_simulator::{Cache, Ingredients, Plan, Program, RestBrain, Scene, SkullWall, TissueClass, open_case};
 use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
 use trepan_volume::BoneVolume;
@@ -66,10 +66,10 @@ impl Head {
     /// The brain at rest as the programs hold it, after a time of relaxation, minutes.
     pub fn at_rest(&self) -> Result<Still> {
         let with = Ingredients::of(Quality::Auto);
-        let Held { fixed, anchors, wall } = self.brain.held_in_skull(Arc::clone(&self.bone), &self.plan)?;
-        let body = self.brain.body(with.materials(BRAIN_MPA), fixed, anchors);
+        let held = self.brain.held_in_skull(Arc::clone(&self.bone), &self.plan)?;
+        let body = self.brain.body(with.materials(BRAIN_MPA), with.pia_arachnoid_n_per_mm, &held);
         Ok(Still {
-            wall,
+            wall: held.wall,
             solver: solver(&body, with.relaxation(), 0.0)?,
             relaxation: with.relaxation(),
             body,
