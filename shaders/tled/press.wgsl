@@ -21,7 +21,7 @@ struct Spring {
     first: u32,
     count: u32,
 }
-@group(0) @binding(1) var<storage, read> springs: array<Spring>;
+@group(0) @binding(1) var<storage, read_write> springs: array<Spring>;
 // Of every node of every spring: place; bits of the weight, of 1/m, of the share of m that has
 // weight.
 @group(0) @binding(2) var<storage, read> touched: array<vec4u>;
@@ -145,4 +145,6 @@ fn add_up(lane: u32, lanes: u32) {
     sums[lane] = vec3f(beside, 0.0, 0.0);
     add_up(lane, LANES);
     if lane == 0u { pressure[0] = total + sums[0].x; }
+    // The tools go on to the next step.
+    for (var s = lane; s < singles_end; s += LANES) { springs[s].rest_depth -= now.dt * springs[s].tool_velocity; }
 }

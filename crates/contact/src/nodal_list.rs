@@ -8,6 +8,7 @@
 
 use crate::{NodalContact, PlaneContact};
 use core::ops::{Deref, DerefMut};
+use trepan_geometry::Vec3;
 
 /// Most springs on one body: the places under a tool's tip, its shaft, and what touches a fold.
 pub const MAX_SPRINGS: usize = 512;
@@ -68,6 +69,13 @@ impl NodalContacts {
     /// Moves each spring with its tool by a time, ms: tools go on between two collision results.
     pub fn follow_tool(&mut self, dt_ms: f32) {
         self.springs.iter_mut().for_each(|spring| spring.offset_mm -= dt_ms * spring.tool_normal_velocity);
+    }
+
+    /// Stops the tools where they are now.
+    pub fn stop_tool(&mut self) {
+        self.springs.iter_mut().for_each(|spring| {
+            (spring.tool_normal_velocity, spring.lateral_velocity) = (0.0, Vec3::ZERO);
+        });
     }
 
     /// Becomes what `other` is.

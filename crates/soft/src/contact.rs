@@ -58,13 +58,15 @@ pub struct Gain {
 /// Presses springs on a body, with what they did so far in a step by node.
 #[derive(Clone, Debug)]
 pub struct ImplicitSprings {
+    /// Time for which the tools have gone on since the contacts were given, ms.
+    pub elapsed_ms: f32,
     moved: Vec<Vec3>,
 }
 
 impl ImplicitSprings {
     /// For a body of so many nodes.
     pub fn on_nodes(nodes: usize) -> Self {
-        Self { moved: vec![Vec3::ZERO; nodes] }
+        Self { elapsed_ms: 0.0, moved: vec![Vec3::ZERO; nodes] }
     }
 
     /// Adds every spring's force to the nodes, `add(node, N)`, then every plane's; gives the sum of
@@ -133,7 +135,8 @@ impl ImplicitSprings {
     /// How deep the tissue is in a spring now, mm.
     fn depth_of(&self, spring: &NodalContact, free: &impl Fn(u32) -> FreeNode) -> f32 {
         let known = spring.nodes().filter(|(n, _)| (*n as usize) < self.moved.len());
-        spring.offset_mm + known.map(|(n, w)| w * free(n).position.dot(spring.normal)).sum::<f32>()
+        let offset_mm = spring.offset_mm - self.elapsed_ms * spring.tool_normal_velocity;
+        offset_mm + known.map(|(n, w)| w * free(n).position.dot(spring.normal)).sum::<f32>()
     }
 
     fn force_of(&self, spring: &NodalContact, depth: f32, step: Gain, free: &impl Fn(u32) -> FreeNode) -> f32 {

@@ -30,11 +30,11 @@
 //! analyses, Int. J. Numer. Meth. Engng 63, 2005. A. Tkachuk, M. Bischoff: Direct and sparse
 //! construction of consistent inverse mass matrices, Int. J. Numer. Meth. Engng 101, 2015.
 
-use crate::base::Base;
 use crate::scaling::Scaling;
 use glam::Vec4;
 use std::collections::BTreeMap;
 use trepan_soft::Body;
+use trepan_soft::simd::Layout;
 
 /// Neighbours of every place, with the mass that they share, as rows of one list.
 pub(crate) struct Averaging {
@@ -46,9 +46,14 @@ pub(crate) struct Averaging {
 }
 
 impl Averaging {
-    /// Those of a body with scaled masses and its bounds.
-    pub fn of(body: &Body, base: &Base, scaling: &Scaling) -> Self {
-        let (layout, stiffest) = (&base.layout, base.bound.stiffest);
+    /// Those of a body with scaled masses, the largest ω² `stiffest`, 1/ms², and a mass on each
+    /// corner of each triangle of its membrane, g.
+    pub fn of(
+        body: &Body,
+        layout: &Layout,
+        (scaling, stiffest): (&Scaling, f32),
+        of_membrane: impl Iterator<Item = f64>,
+    ) -> Self {
         let mut rows = vec![BTreeMap::<u32, f64>::new(); layout.node_at.len()];
         for (t, tet) in body.mesh.tets.iter().enumerate() {
             let grams = f64::from(body.material(t).density_g_mm3()) * body.mesh.volume_mm3(t);
@@ -59,7 +64,7 @@ impl Averaging {
                 *rows[a as usize].entry(b).or_default() += sixteenth;
             }
         }
-        for (corners, grams) in body.membrane.triangles.iter().zip(base.membrane_masses_g(body)) {
+        for (corners, grams) in body.membrane.triangles.iter().zip(of_membrane) {
             let places = corners.map(|n| layout.place_of[n as usize]);
             for (a, b) in places.iter().flat_map(|a| places.iter().map(move |b| (*a, *b))).filter(|(a, b)| a != b) {
                 *rows[a as usize].entry(b).or_default() += grams / 3.0;

@@ -33,6 +33,7 @@ impl SoftSolver for Tled {
         let mut report = StepReport { converged: true, ..StepReport::default() };
         let mut left_ms = dt_ms.max(0.0);
         while left_ms > 1e-5 * dt_ms && report.substeps < self.base.config.substeps.max(1) {
+            self.springs.elapsed_ms = dt_ms - left_ms;
             left_ms -= self.substep(loads, left_ms, &mut report);
             report.substeps += 1;
         }
@@ -157,7 +158,8 @@ impl Tled {
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
         let (base, masses, scaling) = Base::of(body, config)?;
         let averages = base.config.selective_mass_scaling;
-        let averaging = averages.then(|| Averaging::of(body, &base, &scaling));
+        let averaging = averages
+            .then(|| Averaging::of(body, &base.layout, (&scaling, base.bound.stiffest), base.membrane_masses_g(body)));
         let nodes = Nodes::of(body, &base.layout, &masses, averaging);
         Ok(Self {
             gravity: Vec3::ZERO,

@@ -51,6 +51,31 @@ fn a_tool_that_presses_so_hard_that_steps_are_cut_comes_to_rest() {
     }
 }
 
+/// One call of three substeps is three calls of one, between which the tool goes on.
+#[test]
+fn a_tool_goes_on_within_a_call() {
+    let body = block();
+    let mut contact = NodalContact::none();
+    (contact.normal, contact.stiffness, contact.tool_normal_velocity) = (Vec3::Z, 0.3, -0.04);
+    contact.offset_mm = -60.0;
+    boxes::nodes_where(&body.mesh, |p| p.z > 59.9 && p.x < 21.0).iter().for_each(|&n| contact.add(n, 1.0));
+    contact.normalise();
+    let pressed_n = |calls: u32| {
+        let mut tled = Tled::new(&body, &Config { safety: 0.5, ..Config::default() }).unwrap();
+        let mut loads = Loads { contacts: contact.into(), ..Loads::default() };
+        let dt_ms = 3.0 * tled.stable_dt_ms() / calls as f32;
+        let mut forces = (0..30 * calls).map(|_| {
+            let report = tled.step(&loads, dt_ms);
+            loads.contacts.follow_tool(dt_ms);
+            assert_eq!(report.substeps * calls, 3);
+            report.contact_n
+        });
+        forces.by_ref().last().unwrap()
+    };
+    let [one, three] = [1, 3].map(pressed_n);
+    assert!(three > 0.1 && (one / three - 1.0).abs() < 1e-4, "{one} and {three} N");
+}
+
 #[test]
 fn a_lid_that_moves_down_presses_the_tissue_to_where_the_reference_is() {
     let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));

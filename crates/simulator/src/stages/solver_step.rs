@@ -46,6 +46,9 @@ impl SolverStage {
         if self.followed_ms < FOLLOWED_MS {
             self.loads.contacts.follow_tool(dt_ms);
             self.followed_ms += dt_ms;
+            if self.followed_ms >= FOLLOWED_MS {
+                self.loads.contacts.stop_tool();
+            }
         }
         self.solver_faults.add(&report);
         if !self.loads.contacts.is_empty() {

@@ -111,7 +111,7 @@ impl Press {
         let pressure = Buffer::zeroed(gpu, "pressure", 1)?;
         let bound = [
             (Uniform, (&state.step).into()),
-            (Storage, (&springs).into()),
+            (StorageMut, (&springs).into()),
             (Storage, (&touched).into()),
             (Storage, (&state.u).into()),
             (Storage, (&state.v).into()),
