@@ -13,6 +13,9 @@ const EXAMPLE_LINES: usize = 80;
 /// Longest app, lines.
 const APP_LINES: usize = 150;
 
+/// A choice on nothing, by guards alone: an `if` says the same.
+const ON_NOTHING: &str = concat!("match", " ()");
+
 /// All faults found, each one line.
 pub fn check(root: &Path) -> Result<Vec<String>> {
     let mut faults = Vec::new();
@@ -41,6 +44,9 @@ fn source(root: &Path, file: &Path) -> Result<Option<String>> {
     let is_test = file.ends_with("tests.rs") || file.iter().any(|part| part == "tests");
     if !is_test && !text.starts_with("//!") {
         return Ok(Some(format!("{} does not begin with a module doc", shown(root, file))));
+    }
+    if let Some(line) = text.lines().position(|line| line.contains(ON_NOTHING)) {
+        return Ok(Some(format!("{}:{}: `{ON_NOTHING}`: write `if` and `else if`", shown(root, file), line + 1)));
     }
     if file.with_extension("").is_dir() {
         return Ok(Some(format!(
@@ -125,11 +131,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_module_has_one_place() {
+    fn a_module_has_one_place_and_no_choice_on_nothing() {
         let root = tempfile::tempdir().unwrap();
         let (file, folder) = (root.path().join("a.rs"), root.path().join("a"));
         fs::write(&file, "//! A module.\n").unwrap();
         assert_eq!(source(root.path(), &file).unwrap(), None);
+        fs::write(&file, format!("//! A module.\nfn f() {{ {ON_NOTHING} {{ () => () }} }}\n")).unwrap();
+        assert!(source(root.path(), &file).unwrap().unwrap().starts_with("a.rs:2: "));
+        fs::write(&file, "//! A module.\n").unwrap();
         fs::create_dir(&folder).unwrap();
         assert_eq!(source(root.path(), &file).unwrap().unwrap(), "a.rs lies beside a: move it to a/mod.rs");
     }

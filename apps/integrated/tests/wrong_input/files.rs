@@ -37,14 +37,20 @@ fn head() -> (VoxelVolume<i16>, VoxelVolume<u8>, VoxelVolume<u8>) {
         // The opening of the skull for the brain stem.
         let neck = place.truncate().length() < 14.0 && place.z < -40.0;
         let nose = (place - DVec3::new(0.0, 100.0, -35.0)).length() < 14.0;
-        (ct.data[at], mri.data[at], brain.data[at]) = match () {
-            () if (place / DVec3::new(40.0, 56.0, 38.0)).length() < 1.0 => (35, 150, 1),
-            () if within(0.0) => (40, 105, 1),
-            () if neck => (40, 105, 0),
-            () if within(3.5) => (5, 25, 0),
-            () if within(12.0) => (1100, 12, 0),
-            () if within(19.0) || nose => (60, 200, 0),
-            () => (-1000, 0, 0),
+        (ct.data[at], mri.data[at], brain.data[at]) = if (place / DVec3::new(40.0, 56.0, 38.0)).length() < 1.0 {
+            (35, 150, 1)
+        } else if within(0.0) {
+            (40, 105, 1)
+        } else if neck {
+            (40, 105, 0)
+        } else if within(3.5) {
+            (5, 25, 0)
+        } else if within(12.0) {
+            (1100, 12, 0)
+        } else if within(19.0) || nose {
+            (60, 200, 0)
+        } else {
+            (-1000, 0, 0)
         };
     }
     (ct, mri, brain)

@@ -24,11 +24,14 @@ pub(crate) fn show(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
 
 fn keys(ui: &egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let pressed = |key| ui.input(|i| i.key_pressed(key));
-    match () {
-        () if pressed(Key::Space) => Some(Playback::Run(!timeline.running)),
-        () if pressed(Key::OpenBracket) => timeline.before().map(Playback::Seek),
-        () if pressed(Key::CloseBracket) => timeline.after().map(Playback::Seek),
-        () => None,
+    if pressed(Key::Space) {
+        Some(Playback::Run(!timeline.running))
+    } else if pressed(Key::OpenBracket) {
+        timeline.before().map(Playback::Seek)
+    } else if pressed(Key::CloseBracket) {
+        timeline.after().map(Playback::Seek)
+    } else {
+        None
     }
 }
 

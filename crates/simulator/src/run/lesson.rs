@@ -92,10 +92,12 @@ impl Taught {
 /// Returns the buttons that remain under the teacher's requests.
 fn allowed(buttons: Buttons, flags: u32) -> Buttons {
     let pressed = Buttons(buttons.0 & !Buttons::PAUSE.0);
-    match () {
-        () if flags & TeacherRecord::PAUSE != 0 => Buttons::PAUSE,
-        () if flags & TeacherRecord::NO_POWER != 0 => Buttons(pressed.0 & !Buttons::PEDAL.0),
-        () => pressed,
+    if flags & TeacherRecord::PAUSE != 0 {
+        Buttons::PAUSE
+    } else if flags & TeacherRecord::NO_POWER != 0 {
+        Buttons(pressed.0 & !Buttons::PEDAL.0)
+    } else {
+        pressed
     }
 }
 

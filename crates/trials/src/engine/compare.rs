@@ -61,35 +61,33 @@ enum Nature {
 fn kind(metric: &str) -> (Nature, Better) {
     let ends = |list: &[&str]| list.iter().any(|end| metric.ends_with(end));
     let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
-    match () {
-        () if metric.starts_with("error_over_") => (Nature::Exact, Better::Less),
-        () if ends(&["cpu_s_per_s"]) || metric.starts_with("ns_per_") => (Nature::Time, Better::Less),
-        () if has(&[
-            "spread",
-            "times_",
-            "_over_",
-            "_mb",
-            "share_of",
-            "halves",
-            "predicted",
-            "regret",
-            "late_",
-            "real_time",
-        ]) =>
-        {
-            (Nature::OfTimes, Better::Neither)
-        }
-        () if ends(&["_per_s", "speedup"]) => (Nature::Time, Better::More),
-        () if ends(&["_us", "_ns", "_s"])
-            || ends(&["_ms"]) && has(&["time", "frame", "step", "cost", "calibration"]) =>
-        {
-            (Nature::Time, Better::Less)
-        }
-        () if has(&["error", "missed", "invented", "lost", "drift", "fails", "false", "jump", "differing"]) => {
-            (Nature::Exact, Better::Less)
-        }
-        () if has(&["ssim", "dice", "recovered", "works", "held", "told_before"]) => (Nature::Exact, Better::More),
-        () => (Nature::Exact, Better::Neither),
+    if metric.starts_with("error_over_") {
+        (Nature::Exact, Better::Less)
+    } else if ends(&["cpu_s_per_s"]) || metric.starts_with("ns_per_") {
+        (Nature::Time, Better::Less)
+    } else if has(&[
+        "spread",
+        "times_",
+        "_over_",
+        "_mb",
+        "share_of",
+        "halves",
+        "predicted",
+        "regret",
+        "late_",
+        "real_time",
+    ]) {
+        (Nature::OfTimes, Better::Neither)
+    } else if ends(&["_per_s", "speedup"]) {
+        (Nature::Time, Better::More)
+    } else if ends(&["_us", "_ns", "_s"]) || ends(&["_ms"]) && has(&["time", "frame", "step", "cost", "calibration"]) {
+        (Nature::Time, Better::Less)
+    } else if has(&["error", "missed", "invented", "lost", "drift", "fails", "false", "jump", "differing"]) {
+        (Nature::Exact, Better::Less)
+    } else if has(&["ssim", "dice", "recovered", "works", "held", "told_before"]) {
+        (Nature::Exact, Better::More)
+    } else {
+        (Nature::Exact, Better::Neither)
     }
 }
 

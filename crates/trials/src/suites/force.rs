@@ -189,10 +189,12 @@ pub fn press_into(model: &Model, press: &Press, mut record: impl FnMut(f32)) -> 
 /// Contact with the nearest face of the wall, whichever it is.
 fn nearest(x: f32, thick_mm: Option<f32>) -> ContactManifold {
     let (front, back) = (-x, thick_mm.map_or(f32::MAX, |thick| x + thick));
-    match () {
-        () if front <= 0.0 || back <= 0.0 => ContactManifold::default(),
-        () if front <= back => ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm: front }),
-        () => ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::NEG_X, depth_mm: back }),
+    if front <= 0.0 || back <= 0.0 {
+        ContactManifold::default()
+    } else if front <= back {
+        ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm: front })
+    } else {
+        ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::NEG_X, depth_mm: back })
     }
 }
 

@@ -7,14 +7,20 @@ fn tissue(p: DVec3, ct: bool) -> f32 {
     let (skin, skull, brain) = ([0.0, 180.0], [900.0, 10.0], [35.0, 100.0]);
     let pick = |v: [f32; 2]| v[usize::from(!ct)];
     let head = ball(DVec3::ZERO, DVec3::new(70.0, 90.0, 75.0));
-    match () {
-        () if ball(DVec3::new(12.0, 10.0, 5.0), DVec3::new(10.0, 28.0, 12.0)) < 1.0 => pick([8.0, 30.0]),
-        () if ball(DVec3::new(-16.0, -20.0, 12.0), DVec3::new(9.0, 20.0, 8.0)) < 1.0 => pick([8.0, 30.0]),
-        () if head < 0.82 => pick(brain),
-        () if head < 0.92 => pick(skull),
-        () if head < 1.0 => pick(skin),
-        () if ball(DVec3::new(5.0, 55.0, -60.0), DVec3::new(30.0, 25.0, 25.0)) < 1.0 => pick(skull),
-        () => pick([-1000.0, 0.0]),
+    if ball(DVec3::new(12.0, 10.0, 5.0), DVec3::new(10.0, 28.0, 12.0)) < 1.0 {
+        pick([8.0, 30.0])
+    } else if ball(DVec3::new(-16.0, -20.0, 12.0), DVec3::new(9.0, 20.0, 8.0)) < 1.0 {
+        pick([8.0, 30.0])
+    } else if head < 0.82 {
+        pick(brain)
+    } else if head < 0.92 {
+        pick(skull)
+    } else if head < 1.0 {
+        pick(skin)
+    } else if ball(DVec3::new(5.0, 55.0, -60.0), DVec3::new(30.0, 25.0, 25.0)) < 1.0 {
+        pick(skull)
+    } else {
+        pick([-1000.0, 0.0])
     }
 }
 

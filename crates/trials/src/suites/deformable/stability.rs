@@ -197,12 +197,16 @@ impl Record {
     }
 
     fn outcome(&self) -> Outcome {
-        match () {
-            () if self.not_finite > 0 => Outcome::Fails("not a number".into()),
-            () if self.missed_contacts > 0 => Outcome::Fails("misses whole contacts".into()),
-            () if self.missed_points > 0 => Outcome::Degrades("misses points".into()),
-            () if self.invented_points > 0 => Outcome::Degrades("invents points".into()),
-            () => Outcome::Works,
+        if self.not_finite > 0 {
+            Outcome::Fails("not a number".into())
+        } else if self.missed_contacts > 0 {
+            Outcome::Fails("misses whole contacts".into())
+        } else if self.missed_points > 0 {
+            Outcome::Degrades("misses points".into())
+        } else if self.invented_points > 0 {
+            Outcome::Degrades("invents points".into())
+        } else {
+            Outcome::Works
         }
     }
 

@@ -29,10 +29,12 @@ pub const FAMILY: Family<Method> = Family {
 fn methods(_: Scope) -> Vec<Candidate<Method>> {
     let candidate = |method: Method| {
         let told = method.descriptor();
-        let standing = match () {
-            () if told.is_oracle => Standing::Oracle,
-            () if method == Method::RECOMMENDED => Standing::Own,
-            () => Standing::by_name(told.name),
+        let standing = if told.is_oracle {
+            Standing::Oracle
+        } else if method == Method::RECOMMENDED {
+            Standing::Own
+        } else {
+            Standing::by_name(told.name)
         };
         // The oracle is too slow for a way of a thousand steps.
         let conditions = if told.is_oracle { &CONDITIONS[..POINTWISE] } else { &CONDITIONS[..] };
@@ -187,13 +189,15 @@ fn points(method: &Method, condition: &stability::Condition) -> Trial {
     let each = |off: f64| trace.push((trace.len() as f64, off));
     let record = endure(condition, *method, steps(method), scope, each);
     let wrong = record.missed_points + record.invented_points;
-    let fault = match () {
-        () if record.not_finite > 0 => Some("not a number".into()),
-        () if wrong as f64 > MOST_SHARE * record.inside as f64 => Some(format!(
+    let fault = if record.not_finite > 0 {
+        Some("not a number".into())
+    } else if wrong as f64 > MOST_SHARE * record.inside as f64 {
+        Some(format!(
             "misses {} and invents {} of {} points",
             record.missed_points, record.invented_points, record.inside
-        )),
-        () => None,
+        ))
+    } else {
+        None
     };
     Trial { fault, trace }
 }

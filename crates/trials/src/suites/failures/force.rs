@@ -92,13 +92,14 @@ const CONDITIONS: [Condition<Model>; 6] = [
 fn pressed(model: &Model, press: &Press) -> Trial {
     let mut trace = Vec::new();
     let held = press_into(model, press, |x| trace.push((trace.len() as f64 * f64::from(press.tick_ms), x.into())));
-    let fault = match () {
-        () if !held.finite => Some("not a number".into()),
-        () if held.inward_n > 1e-3 => Some(format!("pushes the tool further in, by up to {:.2} N", held.inward_n)),
-        () if exceeds(held.cycle_mm.into(), QUIET_MM.into()) => {
-            Some(format!("the hand swings by {:.2} mm", held.cycle_mm))
-        }
-        () => None,
+    let fault = if !held.finite {
+        Some("not a number".into())
+    } else if held.inward_n > 1e-3 {
+        Some(format!("pushes the tool further in, by up to {:.2} N", held.inward_n))
+    } else if exceeds(held.cycle_mm.into(), QUIET_MM.into()) {
+        Some(format!("the hand swings by {:.2} mm", held.cycle_mm))
+    } else {
+        None
     };
     Trial { fault, trace }
 }

@@ -134,10 +134,12 @@ fn compared(by: &Picture, bone: &Arc<BoneVolume>, frame: &Frame) -> Trial {
         (hit, truth) => hit.is_some() != truth.is_some(),
     });
     let (wrong, all) = (wrong.count(), truth.len());
-    let fault = match () {
-        () if hits.len() != all => Some(format!("{} rays of {all}", hits.len())),
-        () if wrong as f64 > MOST_SHARE * all as f64 => Some(format!("{wrong} of {all} rays are wrong")),
-        () => None,
+    let fault = if hits.len() != all {
+        Some(format!("{} rays of {all}", hits.len()))
+    } else if wrong as f64 > MOST_SHARE * all as f64 {
+        Some(format!("{wrong} of {all} rays are wrong"))
+    } else {
+        None
     };
     // The middle line of the picture.
     let line = (size[1] / 2 * size[0]) as usize..;

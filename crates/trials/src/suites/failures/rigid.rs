@@ -34,10 +34,12 @@ pub const FAMILY: Family<Option<Method>> = Family {
 fn methods(scope: Scope) -> Vec<Candidate<Option<Method>>> {
     let candidate = |method: Method| {
         let told = method.descriptor();
-        let standing = match () {
-            () if told.is_oracle => Standing::Oracle,
-            () if told.source == Method::RECOMMENDED.descriptor().source => Standing::Own,
-            () => Standing::by_name(told.name),
+        let standing = if told.is_oracle {
+            Standing::Oracle
+        } else if told.source == Method::RECOMMENDED.descriptor().source {
+            Standing::Own
+        } else {
+            Standing::by_name(told.name)
         };
         // The oracle is too slow for a loop of thousands of ticks; a quick run leaves out two.
         let first = match standing {
@@ -237,11 +239,14 @@ fn sphere(method: &Option<Method>, voxel_mm: f64) -> Trial {
         jump_n = larger(jump_n, last.replace(error).map_or(0.0, |last| error.distance(last).into()));
         trace.push((tick as f64, error.length().into()));
     }
-    let fault = match () {
-        () if most_n.is_nan() || jump_n.is_nan() => Some("not a number".into()),
-        () if jump_n > MOST_N => Some(format!("the force jumps by up to {jump_n:.2} N in a tick")),
-        () if most_n > MOST_N => Some(format!("the force is up to {most_n:.2} N off")),
-        () => None,
+    let fault = if most_n.is_nan() || jump_n.is_nan() {
+        Some("not a number".into())
+    } else if jump_n > MOST_N {
+        Some(format!("the force jumps by up to {jump_n:.2} N in a tick"))
+    } else if most_n > MOST_N {
+        Some(format!("the force is up to {most_n:.2} N off"))
+    } else {
+        None
     };
     Trial { fault, trace }
 }

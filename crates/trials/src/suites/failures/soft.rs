@@ -221,12 +221,16 @@ impl Watch {
 
 /// What no body may be after a run.
 fn broken(found: &Left) -> Option<String> {
-    match () {
-        () if !found.offset_mm.is_finite() => Some("not a number".into()),
-        () if found.put_back > 0 => Some("nodes burst and are put back".into()),
-        () if found.inverted > 0 => Some(format!("{} elements stay inside out", found.inverted)),
-        () if exceeds(found.fastest.into(), STILL.into()) => Some(format!("still moves by {:.2} mm/ms", found.fastest)),
-        () => None,
+    if !found.offset_mm.is_finite() {
+        Some("not a number".into())
+    } else if found.put_back > 0 {
+        Some("nodes burst and are put back".into())
+    } else if found.inverted > 0 {
+        Some(format!("{} elements stay inside out", found.inverted))
+    } else if exceeds(found.fastest.into(), STILL.into()) {
+        Some(format!("still moves by {:.2} mm/ms", found.fastest))
+    } else {
+        None
     }
 }
 

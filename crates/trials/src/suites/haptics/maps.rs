@@ -78,20 +78,20 @@ fn notes(method: &str) -> Vec<String> {
 /// Outcome of a press.
 fn outcome(row: &Row) -> Outcome {
     let metric = |name: &str| row.metrics[name];
-    match () {
-        () if metric("limit_cycle_mm") > 0.1 && metric("limit_cycle_growth") < 0.8 => {
-            Outcome::Degrades("rings, and dies away".into())
-        }
-        () if metric("limit_cycle_mm") > 1.0 => Outcome::Fails("swings by more than 1 mm".into()),
-        () if metric("limit_cycle_mm") > 0.1 => Outcome::Fails("swings by 0.1 to 1 mm".into()),
-        () if metric("energy_out_j") > 1e-4 => Outcome::Fails("gives the hand more than 0.1 mJ".into()),
-        () if metric("steady_force_lost_percent") > 5.0 => {
-            Outcome::Degrades("more than 5 % of the force is lost".into())
-        }
-        () if metric("motor_energy_out_j") > 1e-4 => {
-            Outcome::Degrades("the motors give more than 0.1 mJ, the device's friction takes it".into())
-        }
-        () => Outcome::Works,
+    if metric("limit_cycle_mm") > 0.1 && metric("limit_cycle_growth") < 0.8 {
+        Outcome::Degrades("rings, and dies away".into())
+    } else if metric("limit_cycle_mm") > 1.0 {
+        Outcome::Fails("swings by more than 1 mm".into())
+    } else if metric("limit_cycle_mm") > 0.1 {
+        Outcome::Fails("swings by 0.1 to 1 mm".into())
+    } else if metric("energy_out_j") > 1e-4 {
+        Outcome::Fails("gives the hand more than 0.1 mJ".into())
+    } else if metric("steady_force_lost_percent") > 5.0 {
+        Outcome::Degrades("more than 5 % of the force is lost".into())
+    } else if metric("motor_energy_out_j") > 1e-4 {
+        Outcome::Degrades("the motors give more than 0.1 mJ, the device's friction takes it".into())
+    } else {
+        Outcome::Works
     }
 }
 

@@ -82,10 +82,13 @@ fn verdict(labels: &VoxelVolume<u16>, config: &Config) -> Outcome {
     let mesh = &labelled.mesh;
     let filled = labels.data.iter().filter(|label| **label != 0).count() as f64 * labels.voxel_mm3();
     let lost = 1.0 - mesh.total_mm3() / filled;
-    match () {
-        () if mesh.check().is_err() => Outcome::Fails("elements are not sound".into()),
-        () if !Surface::of(mesh).is_closed() => Outcome::Fails("the surface is open".into()),
-        () if lost.abs() > LOST => Outcome::Degrades("over a fiftieth of the volume is lost or won".into()),
-        () => Outcome::Works,
+    if mesh.check().is_err() {
+        Outcome::Fails("elements are not sound".into())
+    } else if !Surface::of(mesh).is_closed() {
+        Outcome::Fails("the surface is open".into())
+    } else if lost.abs() > LOST {
+        Outcome::Degrades("over a fiftieth of the volume is lost or won".into())
+    } else {
+        Outcome::Works
     }
 }

@@ -102,12 +102,16 @@ impl Run {
     /// Works if the present contact is `depth` deep along `normal`.
     fn feels(&self, depth: f32, normal: Vec3) -> Outcome {
         let manifold = &self.out.manifold;
-        match () {
-            () if !self.sound => fails("not a number"),
-            () if !manifold.touches() => fails("feels nothing"),
-            () if manifold.normal.dot(normal) < ANGLE_OFF.to_radians().cos() => fails("normal more than 30° off"),
-            () if (manifold.depth_mm - depth).abs() > DEPTH_OFF * VOXEL_MM => degrades("depth more than a voxel off"),
-            () => Outcome::Works,
+        if !self.sound {
+            fails("not a number")
+        } else if !manifold.touches() {
+            fails("feels nothing")
+        } else if manifold.normal.dot(normal) < ANGLE_OFF.to_radians().cos() {
+            fails("normal more than 30° off")
+        } else if (manifold.depth_mm - depth).abs() > DEPTH_OFF * VOXEL_MM {
+            degrades("depth more than a voxel off")
+        } else {
+            Outcome::Works
         }
     }
 
@@ -127,12 +131,16 @@ fn into_bone(method: &Method) -> Outcome {
     for _ in 0..20 {
         run.at(Vec3::Z * -7.0);
     }
-    match () {
-        () if !run.sound => fails("not a number"),
-        () if !run.out.manifold.touches() => fails("feels nothing deep in bone"),
-        () if run.contact.proxy().translation.z > RADIUS_MM - VOXEL_MM => run.presses(),
-        () if run.out.manifold.normal.z < 0.5 => fails("is pushed aside or further in"),
-        () => degrades("is pushed out from where it is, not held outside"),
+    if !run.sound {
+        fails("not a number")
+    } else if !run.out.manifold.touches() {
+        fails("feels nothing deep in bone")
+    } else if run.contact.proxy().translation.z > RADIUS_MM - VOXEL_MM {
+        run.presses()
+    } else if run.out.manifold.normal.z < 0.5 {
+        fails("is pushed aside or further in")
+    } else {
+        degrades("is pushed out from where it is, not held outside")
     }
 }
 
@@ -147,12 +155,16 @@ fn starts_in_bone(method: &Method) -> Outcome {
         jump = jump.max(run.force().distance(last));
         last = run.force();
     }
-    match () {
-        () if !run.sound => fails("not a number"),
-        () if run.out.manifold.touches() => fails("still touches 4 mm above the bone"),
-        () if jump > 0.5 => degrades("the force jumps on the way out"),
-        () if !felt => degrades("feels nothing until it is out"),
-        () => run.presses(),
+    if !run.sound {
+        fails("not a number")
+    } else if run.out.manifold.touches() {
+        fails("still touches 4 mm above the bone")
+    } else if jump > 0.5 {
+        degrades("the force jumps on the way out")
+    } else if !felt {
+        degrades("feels nothing until it is out")
+    } else {
+        run.presses()
     }
 }
 
@@ -201,12 +213,16 @@ fn squeezed(method: &Method) -> Outcome {
         jump = jump.max(run.force().distance(last));
         last = run.force();
     }
-    match () {
-        () if !run.sound => fails("not a number"),
-        () if run.out.manifold.touches() => fails("still touches above the bone"),
-        () if jump > 1.0 => fails("the force jumps by more than 1 N a tick"),
-        () if jump > 0.3 => degrades("the force jumps by more than 0.3 N a tick"),
-        () => Outcome::Works,
+    if !run.sound {
+        fails("not a number")
+    } else if run.out.manifold.touches() {
+        fails("still touches above the bone")
+    } else if jump > 1.0 {
+        fails("the force jumps by more than 1 N a tick")
+    } else if jump > 0.3 {
+        degrades("the force jumps by more than 0.3 N a tick")
+    } else {
+        Outcome::Works
     }
 }
 
@@ -266,11 +282,14 @@ fn flicker(method: &Method) -> Outcome {
         jump = jump.max(run.force().distance(last));
         last = run.force();
     }
-    match () {
-        () if !run.sound => fails("not a number"),
-        () if jump > 0.5 => fails("the force jumps by more than 0.5 N a tick"),
-        () if jump > 0.1 => degrades("the force jumps by more than 0.1 N a tick"),
-        () => Outcome::Works,
+    if !run.sound {
+        fails("not a number")
+    } else if jump > 0.5 {
+        fails("the force jumps by more than 0.5 N a tick")
+    } else if jump > 0.1 {
+        degrades("the force jumps by more than 0.1 N a tick")
+    } else {
+        Outcome::Works
     }
 }
 

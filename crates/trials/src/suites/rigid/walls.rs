@@ -154,13 +154,18 @@ pub fn lost(
     }
     let proxy = contact.proxy().translation;
     let push = out.manifold.normal.dot(normal);
-    match () {
-        () if !proxy.is_finite() || !out.manifold.is_finite() => Some("no number"),
-        () if proxy.dot(normal) < 0.0 => Some("through the wall"),
-        () if !out.manifold.touches() => Some("no contact"),
-        () if push < 0.0 => Some("pushed out on the far side"),
-        () if push < 0.5 => Some("normal more than 60° off"),
-        () => None,
+    if !proxy.is_finite() || !out.manifold.is_finite() {
+        Some("no number")
+    } else if proxy.dot(normal) < 0.0 {
+        Some("through the wall")
+    } else if !out.manifold.touches() {
+        Some("no contact")
+    } else if push < 0.0 {
+        Some("pushed out on the far side")
+    } else if push < 0.5 {
+        Some("normal more than 60° off")
+    } else {
+        None
     }
 }
 

@@ -159,15 +159,22 @@ fn endured(of: &Solver, body: &Body, loads: &Loads, step_share: f32, most_mm: f6
     let mut solver = of.build(body);
     let dt_ms = step_share * solver.stable_dt_ms().min(LONGEST_MS);
     let left = left(&mut *solver, body, loads, dt_ms, steps(of, dt_ms), &mut |_| ());
-    match () {
-        () if !left.offset_mm.is_finite() => Outcome::Fails("not a number".into()),
-        () if left.put_back > 0 => Outcome::Fails("nodes burst and are put back".into()),
-        () if left.offset_mm > most_mm => Outcome::Fails("is where it cannot be".into()),
-        () if left.fastest > STILL => Outcome::Fails("still shaken after a second".into()),
-        () if left.held > 0 => Outcome::Degrades("nodes held at the limits of motion".into()),
-        () if left.skipped_ms > 0.0 => Outcome::Degrades("slower than real time, and says so".into()),
-        () if !left.converged => Outcome::Degrades("does not converge, and says so".into()),
-        () => Outcome::Works,
+    if !left.offset_mm.is_finite() {
+        Outcome::Fails("not a number".into())
+    } else if left.put_back > 0 {
+        Outcome::Fails("nodes burst and are put back".into())
+    } else if left.offset_mm > most_mm {
+        Outcome::Fails("is where it cannot be".into())
+    } else if left.fastest > STILL {
+        Outcome::Fails("still shaken after a second".into())
+    } else if left.held > 0 {
+        Outcome::Degrades("nodes held at the limits of motion".into())
+    } else if left.skipped_ms > 0.0 {
+        Outcome::Degrades("slower than real time, and says so".into())
+    } else if !left.converged {
+        Outcome::Degrades("does not converge, and says so".into())
+    } else {
+        Outcome::Works
     }
 }
 
@@ -190,11 +197,14 @@ pub fn let_go_seen(of: &Solver, depth_mm: f32, speed: f32, see: See) -> Outcome 
     }
     let flat = left(&mut *solver, &body, &pressed(1.0, depth_mm), dt_ms, half, see);
     let after = left(&mut *solver, &body, &Loads::default(), dt_ms, 4 * half, see);
-    match () {
-        () if !after.offset_mm.is_finite() || flat.put_back + after.put_back > 0 => Outcome::Fails("bursts".into()),
-        () if after.offset_mm > 1.0 => Outcome::Fails("does not come back".into()),
-        () if after.offset_mm > 0.2 => Outcome::Degrades("not quite back after two seconds".into()),
-        () => Outcome::Works,
+    if !after.offset_mm.is_finite() || flat.put_back + after.put_back > 0 {
+        Outcome::Fails("bursts".into())
+    } else if after.offset_mm > 1.0 {
+        Outcome::Fails("does not come back".into())
+    } else if after.offset_mm > 0.2 {
+        Outcome::Degrades("not quite back after two seconds".into())
+    } else {
+        Outcome::Works
     }
 }
 
@@ -205,9 +215,11 @@ fn no_numbers(of: &Solver) -> Outcome {
     solver.step(&Loads { gravity: Vec3::NAN, ..Loads::default() }, dt_ms);
     [0.0, -1.0, f32::NAN, f32::INFINITY].into_iter().for_each(|dt_ms| _ = solver.step(&gravity(0.1), dt_ms));
     let after = left(&mut *solver, &body, &Loads::default(), dt_ms, 2 * steps(of, dt_ms), &mut |_| ());
-    match () {
-        () if !after.offset_mm.is_finite() => Outcome::Fails("not a number ever after".into()),
-        () if after.offset_mm > 0.2 => Outcome::Degrades("not back at rest two seconds later".into()),
-        () => Outcome::Works,
+    if !after.offset_mm.is_finite() {
+        Outcome::Fails("not a number ever after".into())
+    } else if after.offset_mm > 0.2 {
+        Outcome::Degrades("not back at rest two seconds later".into())
+    } else {
+        Outcome::Works
     }
 }
