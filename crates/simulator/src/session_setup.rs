@@ -184,9 +184,8 @@ impl SessionSetup {
     }
 
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
-        let (held, settling) = self.held(brain)?;
-        let body = brain.body(with.materials(self.young_mpa), with.pia_arachnoid_n_per_mm, &held);
-        let mut wall = held.wall;
+        let (Held { fixed, anchors, mut wall }, settling) = self.held(brain)?;
+        let body = brain.body(with.materials(self.young_mpa), with.pia_arachnoid_n_per_mm, &fixed, &anchors);
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
         let _first = self.ran.set(ran);
         let touch = touch(&brain.mesh, with)?;

@@ -1,16 +1,17 @@
 //! A thin membrane on a body's surface that carries tension only, such as the pia-arachnoid.
 //!
 //! # Theory
-//! An incompressible neo-Hookean membrane has the energy `μt/2 (λ₁² + λ₂² + 1/(λ₁λ₂)² - 3)` for each
-//! area at rest, with the stretches λ₁ ≥ λ₂ in its plane and its shear modulus times thickness μt.
+//! An incompressible neo-Hookean membrane has the energy `μt/2 (λ₁² + λ₂² + 1/(λ₁λ₂)² - 3)` for
+//! each area at rest, with the stretches λ₁ ≥ λ₂ in its plane and its shear modulus times thickness
+//! μt.
 //! What would be compressed wrinkles instead (tension field: Pipkin, IMA J. Appl. Math. 36, 1986):
 //! λ₂ is at least `λ₁^-1/2`, the width that a strip takes under tension, and no tension is
 //! negative. With `C = Fᵀ F`, its eigenvalues l and eigenvectors n in the plane:
 //! ```text
 //! L = max(l₂, l₁^-1/2)   S = μt (max(0, 1 - 1/(l₁² L)) n₁n₁ᵀ + max(0, 1 - 1/(L² l₁)) n₂n₂ᵀ)
 //! ```
-//! No change of F meets more than 6 μt (both stretches grow, at rest), so on the nodes of a triangle
-//! with area A and gradients g no stiffness is over `6 μt A λ_max(Σ g gᵀ)`.
+//! No change of F meets more than 6 μt (both stretches grow, at rest), so on the nodes of a
+//! triangle with area A and gradients g no stiffness is over `6 μt A λ_max(Σ g gᵀ)`.
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 use trepan_geometry::Vec3;

@@ -191,7 +191,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                 growth = if (L::load(&self.borne[i].growth, part) - grown).not_positive() > 0 {
                     self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.borne[i]), self.added)
                 } else {
-                    // An element that bears its growth by its share of averaging needs no shorter step.
+                    // What it bears by its share of averaging needs no shorter step.
                     grown.smaller(self.dynamic.limit)
                 }
                 .larger(growth);

@@ -71,7 +71,7 @@ impl DynamicScaling {
     pub const NONE: Self = Self { limit: f32::INFINITY, stiffest: 1.0, most: 1.0, averages: false };
 
     /// Lists the mass for the nodes of stiffened elements in some lanes, from the growth of their
-    /// ω²; returns the growth that is left, at most `limit` for what is not stiffened.
+    /// ω². Returns the growth that is left, at most `limit` for what is not stiffened.
     #[cold]
     #[inline(never)]
     pub fn weigh<L: Lane>(

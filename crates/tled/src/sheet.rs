@@ -5,10 +5,11 @@
 //! that a membrane at rest has exactly no tension: with the axes e in the plane and the gradient h
 //! of the displacement, `F = e + h` and `C - 1 = e·h + h·e + h·h`.
 //!
-//! Explicit steps bear the membrane by mass that is added to its nodes: `dt²/3` of a bound of its
-//! stiffness ([`Membrane::node_bounds`](trepan_soft::Membrane::node_bounds)). The mass has no weight,
-//! so equilibria stay; stable are then both without averaged accelerations, `dt² (K + K_m) ≤
-//! 4 (M + M_m)`, and with them (`averaging.rs`, where `M_m` adds `3 M_m` to the right side).
+//! Explicit steps bear the membrane by mass m on its corners, from the bound k of a triangle's
+//! stiffness ([`Membrane::stiffest`](trepan_soft::Membrane::stiffest)). It has no weight, so
+//! equilibria stay. Without averaged accelerations `m = dt²/4 k` keeps `dt² (K + K_m)` within
+//! `4 (M + M_m)`. With them `m = dt²/12 k`, averaged over the triangle like a tetrahedron's:
+//! `K_m ≤ Λ R_m`, and the proof of `averaging.rs` holds with the sums `M + M_m` and `R + R_m`.
 
 use crate::block::{load, minus};
 use trepan_soft::simd::{Lane, Layout, NODES, Pass, PassReport, Quad, WIDTH, dot};

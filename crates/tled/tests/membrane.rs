@@ -67,8 +67,8 @@ fn at_rest_it_has_no_tension_and_weighs_nothing() {
     assert!((weights[0] / weights[1] - 1.0).abs() < 1e-3, "{weights:?} N");
 }
 
-/// Motion of a shaken body, without damping, in the last of 24,000 steps or of twice as many half
-/// as long: Σ v² over nodes and steps.
+/// Motion of a shaken body without damping in the last third of 24,000 steps, or of twice as many
+/// half as long. It is Σ v² over nodes and steps.
 fn motion(selective_mass_scaling: bool, halves: usize) -> f32 {
     let config = Config { damping: Damping::None, selective_mass_scaling, ..Config::default() };
     let (body, bare) = (block(1.0, true), Tled::new(&block(0.0, true), &config).unwrap());

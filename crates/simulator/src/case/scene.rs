@@ -1,6 +1,5 @@
 //! Prepares a case for contact, drilling and deformation.
 
-use crate::case::anchors::Held;
 use crate::case::opening::{bare_brain, bone_of};
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
@@ -13,7 +12,7 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_soft::{Body, Material, Membrane};
+use trepan_soft::{Anchor, Body, Material, Membrane};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.
@@ -92,12 +91,12 @@ impl Scene {
 impl RestBrain {
     /// The body of the brain, of materials by tissue class, in their order, with a membrane of a
     /// shear stiffness on its surface, N/mm.
-    pub fn body(&self, of_classes: Vec<Material>, membrane: f32, Held { fixed, anchors, .. }: &Held) -> Body {
+    pub fn body(&self, of_classes: Vec<Material>, membrane: f32, fixed: &[u32], anchors: &[Anchor]) -> Body {
         let triangles = if membrane > 0.0 { Surface::of(&self.mesh).triangles } else { Vec::new() };
         Body {
             mesh: self.mesh.clone(),
-            fixed: fixed.clone(),
-            anchors: anchors.clone(),
+            fixed: fixed.to_vec(),
+            anchors: anchors.to_vec(),
             membrane: Membrane { triangles, shear_n_per_mm: membrane },
             materials: mixture::materials(of_classes, &self.mixtures, mixture::BOUND),
             material_of_tet: self.class_of_tet.iter().map(|code| code.saturating_sub(1)).collect(),

@@ -4,6 +4,7 @@ use super::{Element, Ingredients, Law, Relaxation, SolverDevice, Support};
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use trepan_budget::Quality;
+use trepan_measurements::brain_membranes;
 use trepan_rigid::{Extent, god_object_sphere};
 
 /// One ingredient of the models.
@@ -205,14 +206,17 @@ pub const KEYS: &[Key] = &[
     },
     Key {
         name: "pia-arachnoid",
-        values: || "off, or a shear stiffness up to 1 N/mm".into(),
-        about: "membrane in tension on the brain's surface; 0.12: human, published, at small strain",
+        values: || "off, on, or a shear stiffness up to 1 N/mm".into(),
+        about: "membrane in tension on the brain's surface; on: human, published, at small strain",
         usual: Some("off"),
-        presets: &[(Quality::Auto, PIA_ARACHNOID), (Quality::Fine, PIA_ARACHNOID)],
-        compared: || vec![PIA_ARACHNOID.into()],
-        realistic: Some(PIA_ARACHNOID),
+        presets: &[(Quality::Auto, "on"), (Quality::Fine, "on")],
+        compared: on,
+        realistic: Some("on"),
         get: |i| Some(off_or(i.pia_arachnoid_n_per_mm)),
-        set: |i, text| up_to(text, 1.0).map(|n_per_mm| i.pia_arachnoid_n_per_mm = n_per_mm),
+        set: |i, text| {
+            let published = (text == "on").then(|| brain_membranes::PIA_SHEAR_STIFFNESS.f32());
+            published.or_else(|| up_to(text, 1.0)).map(|n_per_mm| i.pia_arachnoid_n_per_mm = n_per_mm)
+        },
         ..Key::of(Part::Tled)
     },
     Key {
@@ -319,8 +323,6 @@ pub const KEYS: &[Key] = &[
 /// both assumed.
 const FRICTION_ON_TISSUE: &str = "0.1";
 const FRICTION_ON_BONE: &str = "0.3";
-/// Shear stiffness of human pia-arachnoid, N/mm: `brain_membranes::PIA_SHEAR_STIFFNESS`.
-const PIA_ARACHNOID: &str = "0.12";
 /// The law that is fitted to human brain.
 const FITTED: &str = "stiffening";
 /// Total Lagrangian explicit dynamics.

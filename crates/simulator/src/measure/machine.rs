@@ -13,9 +13,10 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 use trepan_budget::Machine;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile, units};
+use trepan_mesh::Surface;
 use trepan_render::{Camera, Frame, ProcessorRenderer, SceneData, SliceLook};
 use trepan_rigid::{Method, RigidStep};
-use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
@@ -57,7 +58,9 @@ fn ns_per_tet_step(clock: &Clock, ingredients: &Ingredients) -> f64 {
     let tets = mesh.tets.len();
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
     let material = ingredients.laws[0].material(TissueClass::Brain, Material::BRAIN.young_mpa() as f32);
-    let body = Body::uniform(mesh, fixed, material);
+    let membrane =
+        Membrane { triangles: Surface::of(&mesh).triangles, shear_n_per_mm: ingredients.pia_arachnoid_n_per_mm };
+    let body = Body { membrane, ..Body::uniform(mesh, fixed, material) };
     let config = Config { threads: 1, still_mm: 0.0, selective_mass_scaling: false, ..ingredients.config() };
     let mut solver = Tled::new(&body, &config).expect("a split box is a valid mesh");
     // A small load: under the whole weight every element of a bare box would stiffen.

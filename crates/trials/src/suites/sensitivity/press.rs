@@ -8,9 +8,10 @@
 use super::scene::{Input, OUTPUTS, Scene};
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
-use trepan_measurements::{brain_living, fits, hands, sensitivity};
+use trepan_measurements::{brain_living, brain_membranes, fits, hands, sensitivity};
+use trepan_mesh::Surface;
 use trepan_simulator::{HapticConfig, Program, TissueClass};
-use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 
 /// Megapascals in a kilopascal.
@@ -36,6 +37,7 @@ pub fn scene() -> Scene {
         Input { value: relaxed, ..Input::of("share of stress that stays", sensitivity::RELAXED_SHARE) },
         Input::of("times of relaxation", sensitivity::RELAXATION_TIMES),
         Input::of("spring of the hand on tissue", hands::TISSUE_STIFFNESS),
+        Input::of("stiffness of the pia-arachnoid", brain_membranes::PIA_SHEAR_STIFFNESS),
     ]);
     Scene { name: "press", inputs, outputs: ["greatest force, N", "force after 1 s, N"], run }
 }
@@ -77,7 +79,7 @@ pub fn config(relaxation: Relaxation) -> Config {
 }
 
 fn run(values: &[f64]) -> [f64; OUTPUTS] {
-    let &[shear, compressibility, density, share, bound, at_speed, relaxed, times, spring] = values else {
+    let &[shear, compressibility, density, share, bound, at_speed, relaxed, times, spring, pia] = values else {
         unreachable!()
     };
     let usual = Relaxation::SOLID_AND_FLUID;
@@ -90,7 +92,11 @@ fn run(values: &[f64]) -> [f64; OUTPUTS] {
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
     let middle = Vec3::new(0.5, 0.5, 1.0) * EDGE_MM;
     let pressed = boxes::nodes_where(&mesh, |p| p.distance(middle) < TIP_MM && p.z > EDGE_MM - 1e-3);
-    let body = Body::uniform(mesh, fixed, brain([at_speed * shear, compressibility, density, share, bound]));
+    let top = |t: &[u32; 3]| t.iter().all(|&n| mesh.positions[n as usize].z > EDGE_MM - 1e-3);
+    let triangles = Surface::of(&mesh).triangles.into_iter().filter(top).collect();
+    let material = brain([at_speed * shear, compressibility, density, share, bound]);
+    let membrane = Membrane { triangles, shear_n_per_mm: pia as f32 };
+    let body = Body { membrane, ..Body::uniform(mesh, fixed, material) };
     let mut solver = Tled::new(&body, &config(relaxation)).expect("a block on its base is held");
     let mut contact = NodalContact::none();
     pressed.iter().for_each(|node| contact.add(*node, 1.0));
@@ -121,7 +127,7 @@ mod tests {
         let scene = scene();
         let values: Vec<f64> = scene.inputs.iter().map(|input| input.value).collect();
         let mut twice = values.clone();
-        (twice[0], twice[8]) = (2.0 * values[0], 2.0 * values[8]);
+        (twice[0], twice[8], twice[9]) = (2.0 * values[0], 2.0 * values[8], 2.0 * values[9]);
         let (one, two) = ((scene.run)(&values), (scene.run)(&twice));
         assert!(one[0] > one[1] && one[1] > 0.01, "{one:?}");
         for (a, b) in one.iter().zip(two) {

@@ -63,8 +63,7 @@ pub fn findings() -> Result<Findings> {
 /// The brain at rest in a solver.
 fn solver(brain: &RestBrain, material_of_tet: Vec<u8>) -> Result<SolverStage> {
     let of_classes = TissueClass::ALL.map(|class| class.material(BRAIN_MPA)).to_vec();
-    let held = brain.held_by_base(None)?;
-    let body = Body { material_of_tet, ..brain.body(of_classes, 0.0, &held) };
+    let body = Body { material_of_tet, ..brain.body(of_classes, 0.0, &brain.fixed, &[]) };
     Ok(SolverStage::new(Box::new(trepan_tled::Tled::new(&body, &trepan_tled::Config::default())?)))
 }
 

@@ -67,7 +67,7 @@ impl Head {
     pub fn at_rest(&self) -> Result<Still> {
         let with = Ingredients::of(Quality::Auto);
         let held = self.brain.held_in_skull(Arc::clone(&self.bone), &self.plan)?;
-        let body = self.brain.body(with.materials(BRAIN_MPA), with.pia_arachnoid_n_per_mm, &held);
+        let body = self.brain.body(with.materials(BRAIN_MPA), with.pia_arachnoid_n_per_mm, &held.fixed, &held.anchors);
         Ok(Still {
             wall: held.wall,
             solver: solver(&body, with.relaxation(), 0.0)?,
