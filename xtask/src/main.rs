@@ -1,8 +1,9 @@
-//! The project's own commands: `cargo xtask test | validate | merge | compare | bundle | layers |
-//! tidy`.
+//! The project's own commands: `cargo xtask test | ci | fuzz | validate | merge | compare | bundle |
+//! layers | tidy`.
 
 mod bundle;
 mod constants;
+mod fuzz;
 mod layers;
 mod merge;
 mod modules;
@@ -28,9 +29,18 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc
-    /// tests, docs, the quick validation, the bundle for a graphics card
+    /// What a change must pass: fmt, layers, tidy, clippy, tests, doc tests, docs. Needs a Vulkan
+    /// driver; Mesa's software driver will do
     Test,
+    /// Everything that CI runs: `test`, a short headless operation, the quick validation, the bundle
+    /// for a graphics card
+    Ci,
+    /// Run the property tests again and again, each round with a fresh, printed seed
+    Fuzz {
+        /// For so long; at least one round
+        #[arg(long, value_name = "N", default_value_t = 10.0)]
+        minutes: f64,
+    },
     /// Run validation suites in release mode; writes SUITE.json and index.html
     Validate {
         /// Passed on: SUITE, --quick, --shard I/N, --out DIR
@@ -90,7 +100,13 @@ fn main() -> ExitCode {
 
 fn run() -> Result<()> {
     match Arguments::parse().command {
-        Task::Test => test(),
+        Task::Test => {
+            test()?;
+            println!("xtask test: all passed");
+            Ok(())
+        }
+        Task::Ci => ci(),
+        Task::Fuzz { minutes } => fuzz::run(&root(), minutes),
         Task::Validate { arguments } => validate(&arguments),
         Task::Merge { folders, out } if folders.iter().any(|folder| folder.join("parts").is_dir()) => {
             let mut arguments = vec!["merge".into()];
@@ -128,6 +144,16 @@ fn validate(arguments: &[String]) -> Result<()> {
 }
 
 /// The steps of CI in the order in which they fail fastest.
+fn ci() -> Result<()> {
+    test()?;
+    operation::check(&root())?;
+    validation::check(&root())?;
+    bundle::check(&root())?;
+    println!("xtask ci: all passed");
+    Ok(())
+}
+
+/// The steps that every change must pass.
 fn test() -> Result<()> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     report("layers", layers::check(&root())?)?;
@@ -136,14 +162,9 @@ fn test() -> Result<()> {
         &["clippy", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet", "--", "--deny", "warnings"],
         &[],
     )?;
-    operation::check(&root())?;
     tests()?;
     cargo(&["test", "--workspace", "--doc", "--quiet"], &[])?;
-    documentation()?;
-    validation::check(&root())?;
-    bundle::check(&root())?;
-    println!("xtask test: all passed");
-    Ok(())
+    documentation()
 }
 
 /// Nextest where it is installed, for its timeouts and its clear failures; else cargo's own runner.
@@ -193,6 +214,7 @@ fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {
         .args(arguments)
         .args(more)
         .env(DRAWS[0], std::env::var(DRAWS[0]).unwrap_or_else(|_| DRAWS[1].into()))
+        .env("TREPAN_REQUIRE_GPU", "1")
         .current_dir(root())
         .status()
         .with_context(|| format!("cannot start cargo {}", arguments[0]))?;

@@ -232,7 +232,7 @@ pub fn adapter_for_tests() -> Option<Gpu> {
     };
     assert_eq!(error, GpuError::NoAdapter);
     let is_required = ["CI", "TREPAN_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-    assert!(!is_required, "this test needs a GPU adapter: {error}");
+    assert!(!is_required, "this test needs a Vulkan driver (Debian: mesa-vulkan-drivers): {error}");
     eprintln!("skipped: no GPU adapter");
     None
 }
