@@ -1,5 +1,5 @@
-//! The project's own commands: `cargo xtask test | ci | fuzz | validate | merge | compare | bundle |
-//! layers | tidy`.
+//! The project's own commands: `cargo xtask test | ci | fuzz | validate | merge | compare |
+//! calibrate | bundle | layers | tidy`.
 
 mod bundle;
 mod constants;
@@ -32,8 +32,8 @@ enum Task {
     /// What a change must pass: fmt, layers, tidy, clippy, tests, doc tests, docs. Needs a Vulkan
     /// driver; Mesa's software driver will do
     Test,
-    /// Everything that CI runs: `test`, a short headless operation, the quick validation, the bundle
-    /// for a graphics card
+    /// Everything that CI runs: `test`, a short headless operation, the quick validation, the
+    /// bundle for a graphics card
     Ci,
     /// Run the property tests again and again, each round with a fresh, printed seed
     Fuzz {

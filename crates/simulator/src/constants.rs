@@ -18,6 +18,7 @@ const USED: &[&str] = &[
     "brain-living/swine-ogden-exponent",
     "brain-living/swine-ogden-shear-modulus",
     "brain-living/young-modulus",
+    "brain-membranes/pia-shear-stiffness",
     "brain-relaxation/cortex-time",
     "brain-relaxation/fluid-time",
     "brain-relaxation/slow-time",

@@ -85,8 +85,9 @@ impl DynamicScaling {
         grown.store(&mut left, part);
         let lanes = part * L::LANES..(part + 1) * L::LANES;
         for (lane, at) in lanes.enumerate() {
-            // Also for NaN.
-            if !(left[at] > borne.growth[at]) {
+            // False for NaN.
+            let is_stiffened = left[at] > borne.growth[at];
+            if !is_stiffened {
                 left[at] = left[at].min(self.limit);
                 continue;
             }

@@ -22,7 +22,7 @@ fn block(shear_n_per_mm: f32, fixed: bool) -> Body {
 fn pull_n(stretch: Vec2, turned: bool) -> f32 {
     let [with, without] = [SHEAR_N_PER_MM, 0.0].map(|shear| {
         let body = block(shear, false);
-        let mut tled = Tled::new(&body, &Config::default()).unwrap();
+        let mut tled = Tled::new(&body, &Config::default()).expect("the block is sound");
         // Turning about y does not change the tension.
         let turn = glam::Quat::from_rotation_y(if turned { 0.9 } else { 0.0 });
         for (n, &p) in body.mesh.positions.iter().enumerate() {
@@ -71,8 +71,8 @@ fn at_rest_it_has_no_tension_and_weighs_nothing() {
 /// half as long. It is Σ v² over nodes and steps.
 fn motion(selective_mass_scaling: bool, halves: usize) -> f32 {
     let config = Config { damping: Damping::None, selective_mass_scaling, ..Config::default() };
-    let (body, bare) = (block(1.0, true), Tled::new(&block(0.0, true), &config).unwrap());
-    let mut tled = Tled::new(&body, &config).unwrap();
+    let (body, bare) = (block(1.0, true), Tled::new(&block(0.0, true), &config).expect("the block is sound"));
+    let mut tled = Tled::new(&body, &config).expect("the block is sound");
     assert_eq!(tled.stable_dt_ms(), bare.stable_dt_ms(), "a membrane takes no shorter step");
     let dt_ms = tled.stable_dt_ms() / halves as f32;
     let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 0.02;

@@ -613,6 +613,7 @@ mod tests {
         let matters = Ingredients {
             element: Element::LockingFree,
             laws: fitted,
+            pia_arachnoid_n_per_mm: 0.12,
             relaxation: Relaxation::SolidAndFluid,
             friction: 0.1,
             bone_friction: 0.3,

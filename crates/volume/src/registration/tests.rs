@@ -7,9 +7,11 @@ fn tissue(p: DVec3, ct: bool) -> f32 {
     let (skin, skull, brain) = ([0.0, 180.0], [900.0, 10.0], [35.0, 100.0]);
     let pick = |v: [f32; 2]| v[usize::from(!ct)];
     let head = ball(DVec3::ZERO, DVec3::new(70.0, 90.0, 75.0));
-    if ball(DVec3::new(12.0, 10.0, 5.0), DVec3::new(10.0, 28.0, 12.0)) < 1.0 {
-        pick([8.0, 30.0])
-    } else if ball(DVec3::new(-16.0, -20.0, 12.0), DVec3::new(9.0, 20.0, 8.0)) < 1.0 {
+    let ventricles = [
+        ball(DVec3::new(12.0, 10.0, 5.0), DVec3::new(10.0, 28.0, 12.0)),
+        ball(DVec3::new(-16.0, -20.0, 12.0), DVec3::new(9.0, 20.0, 8.0)),
+    ];
+    if ventricles.iter().any(|inside| *inside < 1.0) {
         pick([8.0, 30.0])
     } else if head < 0.82 {
         pick(brain)

@@ -59,6 +59,7 @@ pub fn all(scope: Scope) -> Vec<Candidate> {
             ("point shell, averaged", "--quality usual --rigid pointshell-average"),
             ("voxels of 2 mm", "--quality usual --spacing-mm 2"),
             ("voxels of 0.5 mm", "--quality usual --spacing-mm 0.5"),
+            ("fine, 8000 tetrahedra", "--quality fine --tets 8000"),
             ("3000 tetrahedra", "--quality usual --tets 3000"),
             ("24000 tetrahedra", "--quality usual --tets 24000"),
             ("3000, alike everywhere", "--quality usual --tets 3000 --opening-refinement 0"),
