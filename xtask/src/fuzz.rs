@@ -15,6 +15,7 @@ use std::time::{Duration, Instant, SystemTime};
 pub fn run(root: &Path, minutes: f64) -> Result<()> {
     ensure!(minutes > 0.0 && minutes.is_finite(), "--minutes {minutes}: give a number over 0");
     let names = names(root)?;
+    crate::cargo(&["test", "--workspace", "--lib", "--bins", "--tests", "--quiet", "--no-run"], &[])?;
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);
     let mut rounds = 0;
     while rounds == 0 || Instant::now() < end {
@@ -25,7 +26,7 @@ pub fn run(root: &Path, minutes: f64) -> Result<()> {
             .args(["test", "--workspace", "--lib", "--bins", "--tests", "--quiet", "--"])
             .args(&names)
             .env(crate::DRAWS[0], seed.to_string())
-            .env("PROPTEST_FAILURE_PERSISTENCE", "off")
+            .env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1")
             .current_dir(root)
             .status()
             .context("cannot start cargo")?;

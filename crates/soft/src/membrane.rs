@@ -55,6 +55,35 @@ impl TriangleShape {
         let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
         6.0 * self.area_mm2 * largest
     }
+
+    /// Stiffness between each two corners at their present places, N/mm, for a membrane of 1 N/mm:
+    /// `add` takes both and the block. That of small strain where both stretches are in tension,
+    /// along the pull alone where it wrinkles, none where it is slack.
+    pub(crate) fn stiffness(&self, now: [DVec3; 3], mut add: impl FnMut(usize, usize, DMat3)) {
+        let along = |axis: fn(&DVec2) -> f64| (0..3).map(|a| now[a] * axis(&self.gradients[a])).sum::<DVec3>();
+        let (f, g) = (along(|g| g.x), along(|g| g.y));
+        let (mean, apart, shear) = (0.5 * (f.dot(f) + g.dot(g)), 0.5 * (f.dot(f) - g.dot(g)), f.dot(g));
+        let radius = apart.hypot(shear);
+        let (wide, narrow) = (mean + radius, mean - radius);
+        // The eigenvector of the larger stretch, and what lies across it.
+        let pull = DVec2::new(apart + radius, shear).try_normalize().unwrap_or(DVec2::Y);
+        let x = (f * pull.x + g * pull.y).normalize_or_zero();
+        let y = (f * -pull.y + g * pull.x).reject_from(x).normalize_or_zero();
+        let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+        let is_taut = narrow > wide.powf(-0.5);
+        let [of_x, of_y] = [pull, pull.perp()].map(|axis| self.gradients.map(|g| g.dot(axis)));
+        for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+            let block = if is_taut {
+                let (ga, gb) = (x * of_x[a] + y * of_y[a], x * of_x[b] + y * of_y[b]);
+                outer(ga, gb) * 2.0 + outer(gb, ga) + (outer(x, x) + outer(y, y)) * ga.dot(gb)
+            } else if wide > 1.0 {
+                outer(x, x) * (3.0 * of_x[a] * of_x[b])
+            } else {
+                continue;
+            };
+            add(a, b, block * self.area_mm2);
+        }
+    }
 }
 
 impl Membrane {
@@ -72,22 +101,6 @@ impl Membrane {
     /// deformed it is.
     pub fn stiffest(&self, triangle: usize, positions: &[Vec3]) -> f64 {
         f64::from(self.shear_n_per_mm) * self.shape(triangle, positions).stiffest()
-    }
-
-    /// Stiffness at rest of a triangle between each two of its corners, N/mm: `add` takes both and
-    /// the block. Both ways, as if nothing wrinkled.
-    pub(crate) fn stiffness(&self, triangle: usize, positions: &[Vec3], mut add: impl FnMut(u32, u32, DMat3)) {
-        let (corners, shape) = (self.triangles[triangle], self.shape(triangle, positions));
-        let [x, y] = shape.axes;
-        let plane = DMat3::from_cols(x * x.x + y * y.x, x * x.y + y * y.y, x * x.z + y * y.z);
-        let scale = f64::from(self.shear_n_per_mm) * shape.area_mm2;
-        let gradients = shape.gradients.map(|g| x * g.x + y * g.y);
-        let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-        for (&a, ga) in corners.iter().zip(gradients) {
-            for (&b, gb) in corners.iter().zip(gradients) {
-                add(a, b, (outer(ga, gb) * 2.0 + outer(gb, ga) + plane * ga.dot(gb)) * scale);
-            }
-        }
     }
 }
 
@@ -124,6 +137,27 @@ mod tests {
             let length = d.iter().map(|d| d * d).sum::<f64>();
             let bound = TriangleShape::of(rest).stiffest();
             prop_assert!(second <= 1.001 * bound * length + 1e-5, "{second} {}", bound * length);
+        }
+    }
+
+    #[test]
+    fn the_stiffness_is_the_second_change_of_the_energy_near_rest() {
+        let rest = [DVec3::ZERO, DVec3::new(1.2, 0.1, 0.0), DVec3::new(0.4, 0.9, 0.2)];
+        let shape = TriangleShape::of(rest);
+        for (wide, narrow, stiff) in [(1e-3, 5e-4, true), (1e-3, -1e-3, true), (-1e-3, -2e-3, false)] {
+            let [x, y] = shape.axes;
+            let now = rest.map(|p| p + x * (wide * p.dot(x)) + y * (narrow * p.dot(y)));
+            let mut dense = vec![[DMat3::ZERO; 3]; 3];
+            shape.stiffness(now, |a, b, block| dense[a][b] += block);
+            // In its plane: across it tension is what holds, which is left out.
+            let step = [x * 0.3 - y * 0.2, y * 0.7, x * -0.4 - y * 0.1];
+            let h = 1e-4;
+            let at = |s: f64| energy(rest, [0, 1, 2].map(|a| now[a] + step[a] * (s * h)));
+            let second = (at(1.0) - 2.0 * at(0.0) + at(-1.0)) / (h * h);
+            let product = |a: usize, b: usize| step[a].dot(dense[a][b] * step[b]);
+            let found: f64 = (0..9).map(|k| product(k / 3, k % 3)).sum();
+            assert_eq!(found > 1e-3, stiff, "{wide} {narrow}: {found} of {second}");
+            assert!((found - second).abs() < 0.05 * second + 1e-9, "{wide} {narrow}: {found} of {second}");
         }
     }
 

@@ -19,7 +19,7 @@ use crate::body::Element;
 use crate::bound::dot;
 use crate::energy::{cofactor, cofactor_change, squared};
 use crate::factor::Factor;
-use crate::{Anchor, Body, Law, Loads};
+use crate::{Anchor, Body, Law, Loads, TriangleShape};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 use trepan_contact::NodalContact;
@@ -36,8 +36,9 @@ pub struct Tangent {
     /// Node groups over which pressure is averaged; empty where it is not.
     groups: Vec<Group>,
     anchors: Vec<Anchor>,
-    /// Stiffness of the membrane between two nodes, N/mm.
-    membrane: Vec<(u32, u32, DMat3)>,
+    /// Triangles of the membrane, and its shear stiffness, N/mm.
+    membrane: Vec<([u32; 3], TriangleShape)>,
+    membrane_n_per_mm: f64,
     rest: Vec<DVec3>,
     fixed: Vec<bool>,
     factor: Factor,
@@ -75,21 +76,22 @@ impl Tangent {
         let (elements, fixed) = (body.elements(), body.fixed_mask());
         let groups = if averaged_pressure { groups(&elements, &body.bulk_groups()) } else { Vec::new() };
         let cells = elements.iter().map(|e| &e.corners[..]).chain(groups.iter().map(|g| &g.nodes[..]));
+        let cells = cells.chain(body.membrane.triangles.iter().map(|t| &t[..]));
         let factor = Factor::of(&fixed, cells)?;
         let laws: Vec<Law> = body.materials.iter().map(crate::Material::law).collect();
         let mean_mm = (body.mesh.total_mm3() / elements.len() as f64).cbrt();
         let element_stiffness = laws.iter().map(|law| law.moduli().0).fold(0.0, f64::max) * mean_mm;
         let rest = body.mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-        let mut membrane = Vec::new();
-        for t in 0..body.membrane.triangles.len() {
-            body.membrane.stiffness(t, &body.mesh.positions, |a, b, block| membrane.push((a, b, block)));
-        }
+        let positions = &body.mesh.positions;
+        let triangle = |(t, corners): (usize, &[u32; 3])| (*corners, body.membrane.shape(t, positions));
+        let membrane = body.membrane.triangles.iter().enumerate().map(triangle).collect();
         Some(Self {
             elements,
             laws,
             groups,
             anchors: body.anchors.clone(),
             membrane,
+            membrane_n_per_mm: body.membrane.shear_n_per_mm.into(),
             rest,
             fixed,
             factor,
@@ -184,9 +186,13 @@ impl Tangent {
         pressures
     }
 
-    /// Adds the membrane as if nothing wrinkled, anchors, and springs of one node, such as planes.
+    /// Adds the membrane where it is in tension, anchors, and springs of one node, such as planes.
     fn add_nodal(&mut self, u: &[DVec3], loads: &Loads, pressing: &[NodalContact]) {
-        self.membrane.iter().for_each(|&(a, b, block)| self.factor.add(a, b, block));
+        for (corners, shape) in &self.membrane {
+            let now = corners.map(|n| self.rest[n as usize] + u[n as usize]);
+            let scale = self.membrane_n_per_mm;
+            shape.stiffness(now, |a, b, block| self.factor.add(corners[a], corners[b], block * scale));
+        }
         for &Anchor { node, normal, along, across, in_fluid, .. } in &self.anchors {
             let place = self.rest[node as usize] + u[node as usize];
             let held = 1.0 - f64::from(in_fluid * loads.fluid.dryness(place.as_vec3()));

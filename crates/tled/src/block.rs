@@ -192,7 +192,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Forces<'_, M, K, T> {
                     self.dynamic.weigh(grown, part, (block.corners::<L>(part), &self.borne[i]), self.added)
                 } else {
                     // What it bears by its share of averaging needs no shorter step.
-                    grown.smaller(self.dynamic.limit)
+                    grown.larger(L::splat(0.0)).smaller(self.dynamic.limit)
                 }
                 .larger(growth);
                 if T > 0 {

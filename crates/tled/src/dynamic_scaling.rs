@@ -88,7 +88,8 @@ impl DynamicScaling {
             // False for NaN.
             let is_stiffened = left[at] > borne.growth[at];
             if !is_stiffened {
-                left[at] = left[at].min(self.limit);
+                left[at] = left[at].clamp(0.0, self.limit);
+                left[at] = if left[at].is_nan() { 0.0 } else { left[at] };
                 continue;
             }
             // There is room for every corner of every element.

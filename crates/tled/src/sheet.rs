@@ -9,7 +9,8 @@
 //! stiffness ([`Membrane::stiffest`](trepan_soft::Membrane::stiffest)). It has no weight, so
 //! equilibria stay. Without averaged accelerations `m = dt²/4 k` keeps `dt² (K + K_m)` within
 //! `4 (M + M_m)`. With them `m = dt²/12 k`, averaged over the triangle like a tetrahedron's:
-//! `K_m ≤ Λ R_m`, and the proof of `averaging.rs` holds with the sums `M + M_m` and `R + R_m`.
+//! `dt² K_m ≤ 12 R_m`, and the proof of `averaging.rs` holds with the sums `M + M_m` and `R + R_m`.
+//! That is for steps up to the recommended one, which has a margin for the elements only.
 
 use crate::block::{load, minus};
 use trepan_soft::simd::{Lane, Layout, NODES, Pass, PassReport, Quad, WIDTH, dot};

@@ -37,6 +37,7 @@ impl SoftSolver for Tled {
             left_ms -= self.substep(loads, left_ms, &mut report);
             report.substeps += 1;
         }
+        self.springs.elapsed_ms = 0.0;
         report.skipped_ms = left_of(dt_ms, left_ms);
         report
     }
@@ -174,7 +175,8 @@ impl Tled {
         })
     }
 
-    /// Stable (critical) time step without safety factor and averaged accelerations, ms.
+    /// Stable (critical) time step of the elements without safety factor and averaged
+    /// accelerations, ms. A membrane bears [`stable_dt_ms`](SoftSolver::stable_dt_ms) only.
     pub fn bound_ms(&self) -> f32 {
         self.base.bound.at_rest_ms
     }

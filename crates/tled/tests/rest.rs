@@ -4,7 +4,7 @@ use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::Surface;
 use trepan_soft::rivals::reference::{self, Reference};
-use trepan_soft::{Anchor, Body, Fluid, Loads, Material, SoftSolver, SurfacePressure, boxes};
+use trepan_soft::{Anchor, Body, Fluid, Loads, Material, Membrane, SoftSolver, SurfacePressure, boxes};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
 
 /// A body under loads.
@@ -75,6 +75,14 @@ fn anchored() -> Case {
     Case::of("anchors and fluid", body, false, Loads { fluid, ..Loads::default() })
 }
 
+/// The block with a membrane forty times as stiff as its tissue on top.
+fn covered() -> Body {
+    let body = block();
+    let on_top = |t: &[u32; 3]| t.iter().all(|&n| body.mesh.positions[n as usize].z > 39.9);
+    let triangles = Surface::of(&body.mesh).triangles.into_iter().filter(on_top).collect();
+    Body { membrane: Membrane { triangles, shear_n_per_mm: 0.12 }, ..body }
+}
+
 fn cases() -> Vec<Case> {
     let (one, many) = (pressed(&block(), 1.0, 1e4), pressed(&block(), 13.0, 0.3));
     let triangles = Surface::of(&block().mesh).triangles;
@@ -87,6 +95,8 @@ fn cases() -> Vec<Case> {
         Case::of("stiff spring on one node, averaged pressure", block(), true, one),
         Case::of("pressed surface", block(), true, many),
         anchored(),
+        Case::of("membrane under weight", covered(), false, gravity()),
+        Case::of("membrane pressed in", covered(), true, pressed(&block(), 13.0, 0.3)),
         Case::of("rod", rod(0.3, 2, 40), false, gravity()),
         Case::of("incompressible rod, averaged pressure", rod(0.49, 2, 40), true, gravity()),
         Case { pressure: SurfacePressure { triangles, mpa: 1.3e-3 }, ..squeezed },

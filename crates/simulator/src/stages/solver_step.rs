@@ -296,3 +296,32 @@ impl SolverStage {
         &self.solver_faults
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_contact::NodalContact;
+    use trepan_soft::{Body, Material, boxes};
+    use trepan_tled::{Config, Tled};
+
+    #[test]
+    fn a_tool_of_which_nothing_is_heard_stands_after_two_milliseconds() {
+        let mesh = boxes::split_box([3; 3], Vec3::splat(30.0));
+        let body = Body::uniform(mesh, vec![0, 3, 12, 15], Material::BRAIN);
+        let mut stage = SolverStage::new(Box::new(Tled::new(&body, &Config::default()).expect("the block is sound")));
+        let mut contact = NodalContact::none();
+        (contact.normal, contact.stiffness, contact.offset_mm) = (Vec3::Z, 0.1, -30.0);
+        contact.tool_normal_velocity = -0.04;
+        contact.lateral_velocity = Vec3::X;
+        contact.add(63, 1.0);
+        let loads = Loads { contacts: contact.into(), ..Loads::default() };
+        while stage.time_ms() < 20.0 {
+            _ = stage.step(&loads, 1);
+        }
+        let stood = stage.loads.contacts[0];
+        let moved_mm = stood.offset_mm - contact.offset_mm;
+        let expected = 0.04 * FOLLOWED_MS..0.04 * (FOLLOWED_MS + 1.5);
+        assert!(expected.contains(&moved_mm), "{moved_mm}");
+        assert_eq!((stood.tool_normal_velocity, stood.lateral_velocity), (0.0, Vec3::ZERO));
+    }
+}

@@ -212,7 +212,8 @@ impl GpuTled {
         self.fault.as_ref()
     }
 
-    /// Length of a step that is just stable at rest, ms, without any margin.
+    /// Length of a step that the elements just bear at rest, ms, without any margin. A membrane
+    /// bears [`stable_dt_ms`](SoftSolver::stable_dt_ms) only.
     pub fn bound_ms(&self) -> f32 {
         self.base.bound.at_rest_ms
     }

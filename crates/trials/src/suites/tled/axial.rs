@@ -69,7 +69,7 @@ struct Scene {
     stiffness_per_mm2: f32,
     /// Added mass over a session's share of it.
     heavier: f32,
-    /// Shear stiffness of the membrane on the whole surface, N/mm.
+    /// Shear stiffness of the membrane on the top, N/mm.
     membrane_n_per_mm: f32,
 }
 
