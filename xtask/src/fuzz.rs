@@ -11,11 +11,14 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant, SystemTime};
 
+/// The builds of `cargo xtask test`, so that nothing is compiled for this alone.
+const TESTS: [&str; 6] = ["test", "--workspace", "--all-targets", crate::FEATURES[0], crate::FEATURES[1], "--quiet"];
+
 /// Runs every property test of the workspace for about so many minutes, one round at least.
 pub fn run(root: &Path, minutes: f64) -> Result<()> {
     ensure!(minutes > 0.0 && minutes.is_finite(), "--minutes {minutes}: give a number over 0");
     let names = names(root)?;
-    crate::cargo(&["test", "--workspace", "--lib", "--bins", "--tests", "--quiet", "--no-run"], &[])?;
+    crate::cargo(&[&TESTS[..], &["--no-run"]].concat(), &[])?;
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);
     let mut rounds = 0;
     while rounds == 0 || Instant::now() < end {
@@ -23,7 +26,8 @@ pub fn run(root: &Path, minutes: f64) -> Result<()> {
         let seed = now.as_nanos() as u64;
         println!("xtask: {} property tests, {}={seed}", names.len(), crate::DRAWS[0]);
         let status = Command::new("cargo")
-            .args(["test", "--workspace", "--lib", "--bins", "--tests", "--quiet", "--"])
+            .args(TESTS)
+            .arg("--")
             .args(&names)
             .env(crate::DRAWS[0], seed.to_string())
             .env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1")

@@ -88,8 +88,8 @@ impl DynamicScaling {
             // False for NaN.
             let is_stiffened = left[at] > borne.growth[at];
             if !is_stiffened {
-                left[at] = left[at].clamp(0.0, self.limit);
-                left[at] = if left[at].is_nan() { 0.0 } else { left[at] };
+                // Also 0 for NaN.
+                left[at] = left[at].max(0.0).min(self.limit);
                 continue;
             }
             // There is room for every corner of every element.

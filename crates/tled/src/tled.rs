@@ -84,7 +84,8 @@ impl SoftSolver for Tled {
 }
 
 /// Share of the mass that [`Tled::cheaper`](SoftSolver::cheaper) may add. On a block pressed at
-/// 40 mm/s the hand gets 0.024 N more, at rest the same, for 0.46 of the cost.
+/// 40 mm/s the hand gets 0.024 N more, at rest the same, for 0.46 of the cost; under a membrane
+/// more, since its mass grows with the step's square (not measured).
 const CHEAPER_MASS_SCALING: f32 = 0.1;
 
 impl Tled {

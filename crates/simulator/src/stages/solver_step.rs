@@ -152,7 +152,7 @@ impl Maker {
 pub(crate) fn cheaper_text(from_ms: f64) -> String {
     format!(
         "the processor was too slow for the brain: from {:.1} s on its solver took longer steps, and a fast press \
-         feels up to 0.03 N heavier; close programs, or take a lower quality",
+         feels heavier; close programs, or take a lower quality",
         1e-3 * from_ms
     )
 }
