@@ -36,7 +36,7 @@ pub const RENDER_ANAGLYPH: &str = picture!("anaglyph.wgsl");
 pub const RENDER_SECTION: &str = picture!("section.wgsl");
 
 /// Shows a finished picture in a part of the window.
-pub const RENDER_SCREEN: &str = include_str!("../render/screen.wgsl");
+pub const WINDOW_SCREEN: &str = include_str!("../window/screen.wgsl");
 
 /// Prepends the text of `step.wgsl`.
 macro_rules! tled {

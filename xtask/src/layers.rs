@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 6] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
-    &["voxel-size", "budget"],
+    &["voxel-size", "budget", "window"],
     &["simulator"],
     &["trials", "craniotomy", "brain", "integrated"],
 ];
@@ -26,7 +26,7 @@ const SIDEWAYS: [(&str, &str); 2] = [("mesh", "volume"), ("tled", "soft")];
 /// Packages that only some crates may depend on.
 const KEPT: [(&str, &[&str]); 8] = [
     ("wgpu", &["gpu"]),
-    ("eframe", &["render"]),
+    ("eframe", &["window"]),
     ("mcap", &["link"]),
     ("iceoryx2", &["link"]),
     ("clap", &["simulator", "trials"]),
@@ -37,11 +37,11 @@ const KEPT: [(&str, &[&str]); 8] = [
 
 /// Words in the sources that only some crates may use (tests and examples are free).
 const WORDS: [(&str, &[&str]); 6] = [
-    ("Instant::now", &["simulator", "trials", "gpu", "render", "emulators"]),
+    ("Instant::now", &["simulator", "trials", "gpu", "window", "render", "emulators"]),
     ("SystemTime", &["link", "simulator", "trials"]),
     ("thread::sleep", &["simulator", "trials", "emulators"]),
     ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
-    ("std::fs", &["volume", "mesh", "link", "haptics", "render", "simulator", "trials", "emulators"]),
+    ("std::fs", &["volume", "mesh", "link", "haptics", "render", "window", "simulator", "trials", "emulators"]),
     ("unsafe {", &["haptics", "soft", "simulator", "emulators"]),
 ];
 

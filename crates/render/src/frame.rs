@@ -109,7 +109,7 @@ impl SliceLook {
 impl Frame<'_> {
     /// Intersection of the slices: the chosen point, else the tool's tip, or the camera's target if
     /// the tip is outside the volumes' box.
-    pub(crate) fn focus(&self, bounds: Aabb) -> Vec3 {
+    pub fn focus(&self, bounds: Aabb) -> Vec3 {
         let tip = self.world_from_tool.translation;
         if let Some(chosen) = self.slices.through {
             return chosen.clamp(bounds.min, bounds.max);

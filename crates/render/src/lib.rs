@@ -1,5 +1,4 @@
-//! The renderer: ray-cast skull, deforming brain, tools, shadows and slices, headless or in a
-//! window.
+//! The renderer: ray-cast skull, deforming brain, tools, shadows and slices.
 //!
 //! # Theory
 //! Bone is the isosurface of a trilinear density: along a ray each voxel cell is a cubic, whose
@@ -49,8 +48,6 @@ mod slice;
 mod smooth;
 mod stereo;
 mod tool;
-#[cfg(feature = "window")]
-pub mod window;
 
 pub use camera::{Camera, View};
 pub use cut::Cut;
@@ -63,5 +60,6 @@ pub use overlay::Overlay;
 pub use paint::Paint;
 pub use painter::Painter;
 pub use processor::{Casting, ProcessorRenderer};
-pub use report::{BRICKS_PER_FRAME, DrawReport, Hit};
+pub use report::{BRICKS_PER_FRAME, DrawReport, Hit, OUTLINE};
+pub use slice::Plane;
 pub use stereo::{Stereo, StereoLook};

@@ -9,7 +9,7 @@ use glam::Vec3;
 pub const BRICKS_PER_FRAME: usize = 1024;
 
 /// Colour of the brain's outline in the slices.
-pub(crate) const OUTLINE: Vec3 = Vec3::new(1.0, 0.45, 0.55);
+pub const OUTLINE: Vec3 = Vec3::new(1.0, 0.45, 0.55);
 
 /// Smallest fraction of the 3-D view's pixels along an edge.
 pub(crate) const LEAST_DETAIL: f32 = 0.05;

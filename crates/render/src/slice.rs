@@ -24,11 +24,14 @@ const AXES: [[Vec3; 2]; 3] = [[Vec3::NEG_X, Vec3::Y], [Vec3::NEG_X, Vec3::Z], [V
 
 /// A slice plane and its visible area.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Plane {
+pub struct Plane {
+    /// Middle of the visible area, mm.
     pub centre: Vec3,
     /// The point common to all three planes.
     pub through: Vec3,
+    /// Unit vector to the right in the picture.
     pub right: Vec3,
+    /// Unit vector up in the picture.
     pub up: Vec3,
     /// Half width and half height of the visible area, mm.
     pub half: Vec2,

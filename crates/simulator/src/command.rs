@@ -23,8 +23,8 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
-use trepan_render::window::display;
 use trepan_volume::dicom::Series;
+use trepan_window::display;
 
 /// What is logged unless `RUST_LOG` says otherwise. The toolkit of windows warns of settings of the
 /// desktop that do not concern a user.

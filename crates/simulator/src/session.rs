@@ -45,8 +45,8 @@ use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse, spacemouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording, SceneWriter};
 use trepan_render::Camera;
-use trepan_render::window::Stage;
 use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_window::Stage;
 
 /// A session that is ready to run.
 pub struct Session {

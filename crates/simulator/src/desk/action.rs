@@ -2,7 +2,7 @@
 
 use crate::desk::browse::Goal;
 use std::path::PathBuf;
-use trepan_render::window::Drag;
+use trepan_window::Drag;
 
 /// What a press of a control does.
 #[derive(Clone, Debug, PartialEq)]

@@ -23,9 +23,9 @@ use std::sync::Arc;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Site;
-use trepan_render::window::{Amount, Choosable, Drag, Item, Page, Picture};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
 use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_window::{Amount, Choosable, Drag, Item, Page, Picture};
 
 /// Width and height of the picture of the head, pixels.
 const HEAD: [u32; 2] = [420, 340];

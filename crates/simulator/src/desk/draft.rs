@@ -14,9 +14,9 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use trepan_geometry::{Pose, Vec3};
 use trepan_gpu::{Gpu, GpuError};
-use trepan_render::window::{Capture, Panel, Session, Stage, Start, WindowInput};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData, SliceLook};
 use trepan_volume::BoneVolume;
+use trepan_window::{Capture, Panel, Session, Stage, Start, WindowInput};
 
 /// Share of the picture's pixels along an edge.
 const DETAIL: f32 = 0.4;

@@ -10,7 +10,7 @@ use crate::tissue_class::{TissueClass, TissueSource};
 use std::path::{Path, PathBuf};
 use trepan_budget::Quality;
 use trepan_haptics::{Listed, script};
-use trepan_render::window::Choosable;
+use trepan_window::Choosable;
 
 /// The start page as it is filled in.
 #[derive(Clone, Debug, Default)]

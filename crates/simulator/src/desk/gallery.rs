@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_gpu::GpuError;
 use trepan_render::Image;
-use trepan_render::window::{Host, Pages, missing, speak, tr};
+use trepan_window::{Host, Pages, missing, speak, tr};
 
 /// Sizes of the window, pixels, and its scale.
 const SIZES: [([f32; 2], f32); 4] =

@@ -9,7 +9,7 @@ use crate::training::Lesson;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
-use trepan_render::window::{Choosable, Language};
+use trepan_window::{Choosable, Language};
 
 /// Short name and file of each language of the program.
 const OWN: [(&str, &str); 1] = [("de", include_str!("../../languages/de.json"))];

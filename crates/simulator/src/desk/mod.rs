@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! The window opens before anything is loaded. A session loads, runs and writes its files on a
-//! thread of its own and lends its picture to the window ([`trepan_render::window::Stage`]); until
+//! thread of its own and lends its picture to the window ([`trepan_window::Stage`]); until
 //! then a draft of the scene is shown if its case is in the cache.
 
 mod action;
@@ -27,7 +27,7 @@ use crate::program::Program;
 use crate::run::stop::Stop;
 use crate::show::driver;
 use crate::{Inputs, desk::language::Languages, desk::state::Desk};
-use trepan_render::window;
+use trepan_window as window;
 
 /// Runs the program in a window until it is closed; returns what the last session came to.
 pub(crate) fn run(program: Program, options: Options, built_in: Inputs) -> Option<Result<Done, SessionError>> {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_render::Image;
-use trepan_render::window::{Amount, Choosable, Item, Page, Picture};
+use trepan_window::{Amount, Choosable, Item, Page, Picture};
 
 /// The first page.
 pub(crate) fn start(program: Program, form: &Form, picture: Option<Arc<Image>>) -> Page<Action> {

@@ -8,7 +8,7 @@ use crate::report::sessions::{self, SessionRow};
 use crate::settings::Recent;
 use crate::training::Lesson;
 use std::path::{Path, PathBuf};
-use trepan_render::window::{Item, Page};
+use trepan_window::{Item, Page};
 
 /// The page of a session's result.
 pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Action> {

@@ -29,7 +29,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::Listed;
-use trepan_render::window::{Host, Page, Shown, Stage, speak};
+use trepan_window::{Host, Page, Shown, Stage, speak};
 
 /// What the window shows.
 enum View {

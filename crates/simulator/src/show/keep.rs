@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use trepan_render::Image;
-use trepan_render::window::Capture;
+use trepan_window::Capture;
 
 /// Capacity of the queue, pictures.
 const QUEUE: usize = 30;

@@ -6,7 +6,7 @@ use crate::run::View;
 use crate::stages::notice::{Notice, Warning};
 use crate::uncertainty::Band;
 use trepan_geometry::{Buttons, Tool};
-use trepan_render::window::{Choice, Panel, Sound};
+use trepan_window::{Choice, Panel, Sound};
 
 /// Time for which a notice is shown, ms.
 pub(super) const NEWS_MS: f64 = 4000.0;

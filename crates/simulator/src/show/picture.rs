@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_render::window::Pace;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_window::Pace;
 
 /// Half the height of a slice's view around the tool, mm.
 const SLICE_MM: f32 = 60.0;

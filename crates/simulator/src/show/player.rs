@@ -22,9 +22,9 @@ use std::sync::mpsc::Receiver;
 use trepan_geometry::Vec3;
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
-use trepan_render::window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
 use trepan_render::{Camera, Frame, Image, Painter};
 use trepan_volume::BoneVolume;
+use trepan_window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
 
 /// Largest number of voxels and nodes written per picture: some 10 ms.
 const MAX_VOXELS: usize = 500_000;

@@ -12,8 +12,8 @@ use crate::stages::ahead::{bone_ahead_mm, density};
 use std::sync::Arc;
 use trepan_geometry::{Aabb, Pose, Vec3};
 use trepan_mesh::Surface;
-use trepan_render::window::{Panel, Ray, SurfaceHit};
 use trepan_volume::BoneVolume;
+use trepan_window::{Panel, Ray, SurfaceHit};
 
 /// Distance from the tool within which short rays meet the brain, mm.
 const NEAR_MM: f32 = 35.0;

@@ -25,8 +25,8 @@ use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
-use trepan_render::window::{self, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_window::{self as window, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
 
 /// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
 /// largest force at 2 N/mm.
@@ -428,7 +428,7 @@ mod tests {
     use trepan_geometry::ToolState;
     use trepan_haptics::HapticDevice;
     use trepan_link::cell::cell;
-    use trepan_render::window::Pace;
+    use trepan_window::Pace;
 
     #[test]
     fn a_trainee_reads_the_requests() {
