@@ -27,7 +27,7 @@ use super::scripted::{Prepared, Ride, worst};
 use super::{Part, Scope};
 use crate::engine::picture::{Chart, Mark};
 use crate::engine::suite::{Findings, Gate, Row};
-use anyhow::{Result, ensure};
+use anyhow::{Result, anyhow, ensure};
 use bone::Felt;
 use error::Errors;
 use setups::Candidate;
@@ -37,7 +37,9 @@ use trepan_budget::Scene;
 /// What the rows are called.
 const SCENE: &str = "drill, open, press the brain";
 
-const SECOND: &str = "second head: drill, open, press the brain";
+/// The same where a session opens the built-in head by itself, and on another head.
+const OWN: &str = "default opening";
+const SECOND: &str = "second head";
 
 /// One part for each setup, and those of the truth and of a second head.
 pub fn parts(scope: Scope) -> Vec<Part> {
@@ -49,8 +51,9 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     let others = [
         Part::new("error budget of drilling", bone::budget),
         Part::new("truth of two sizes", |scope, findings| reported(findings, "truth of two sizes", two_sizes(scope))),
-        Part::new("second head", |scope, findings| match setups::second_head() {
-            Some(images) => reported(findings, "second head", second_head(scope, &images)),
+        Part::new(OWN, |scope, findings| elsewhere(scope, OWN, "", findings)),
+        Part::new(SECOND, |scope, findings| match setups::second_head() {
+            Some(images) => elsewhere(scope, SECOND, &images, findings),
             None => findings.rows.push(Row::new(SECOND, "not run").with("why", "TREPAN_DATA names no second head")),
         }),
     ];
@@ -94,32 +97,46 @@ fn apart_percent(ride: &Ride, truth: &Ride) -> f64 {
     100.0 * (apart / all).sqrt()
 }
 
-/// What `auto` takes on another head, beside a truth of its own. Bone is judged on the built-in
-/// head only.
-fn second_head(scope: Scope, images: &str) -> Result<(Row, Vec<Gate>)> {
-    let truth = Prepared::open(scope, &format!("{} {images}", setups::truth(scope).flags), None)?.run(&mut |_| {})?;
-    ensure!(truth.opened(), "the truth did not open the skull: nothing can be held against it");
-    let auto = Prepared::open(scope, &format!("--quality auto {images}"), Some(truth.site))?.run(&mut |_| {})?;
-    let errors = Errors::between(&auto, &truth);
+/// What `auto` takes on a head, where it opens it by itself, beside a truth of its own; in full
+/// also meshes by hand. Bone is judged at [`SCENE`] only.
+fn elsewhere(scope: Scope, scene: &'static str, images: &str, findings: &mut Findings) {
+    let truth = Prepared::at_own_opening(scope, &format!("{} {images}", setups::truth(scope).flags), None);
+    let truth = truth.and_then(|prepared| prepared.run(&mut |_| {}));
+    let truth = truth.and_then(|truth| {
+        ensure!(truth.opened(), "the truth did not open the skull: nothing can be held against it");
+        Ok(truth)
+    });
+    for (name, flags) in setups::elsewhere(scope) {
+        let row = truth.as_ref().map_err(|fault| anyhow!("{fault:#}")).and_then(|truth| {
+            let ride = Prepared::at_own_opening(scope, &format!("{flags} {images}"), Some(truth.site))?;
+            Ok((of_brain(scene, name, &ride.run(&mut |_| {})?, truth), Vec::new()))
+        });
+        reported(findings, scene, row);
+    }
+    let of_auto = |row: &&Row| row.scene == scene && row.method == "auto";
+    let auto = findings.rows.iter().find(of_auto).map_or_else(Vec::new, |row| {
+        let number = |name: &str| row.metrics.get(name).copied().unwrap_or(f64::NAN);
+        [
+            ("auto: worst error of the brain over its default tolerance", "error_over_tolerance", 1.0),
+            ("auto: processor time, cores", "cpu_s_per_s", 2.0),
+            ("truth: nodes limited, elements inverted and ms skipped", "truth_solver_faults", 0.0),
+        ]
+        .map(|(what, metric, most)| Gate::at_most(format!("{scene}, {what}"), number(metric), most))
+        .into()
+    });
+    findings.gates.extend(auto);
+}
+
+/// Errors of the brain in one run.
+fn of_brain(scene: &str, name: &str, ride: &Ride, truth: &Ride) -> Row {
+    let errors = Errors::between(ride, truth);
     let over = worst([errors.tissue_over, errors.shown_p95_mm / Scene::default().displacement_mm]);
-    let cpu_s_per_s = auto.cpu_s.iter().sum::<f64>() / auto.seconds;
-    let row = Row::new(SECOND, "auto").with("setup", auto.setup.as_str());
+    let row = Row::new(scene, name).with("setup", ride.setup.as_str());
     let row = errors.named().into_iter().fold(row, |row, (name, value)| row.metric(name, value));
-    let row = row
-        .metric("error_over_tolerance", over)
-        .metric("cpu_s_per_s", cpu_s_per_s)
-        .metric("solver_faults", auto.solver_faults())
-        .metric("truth_solver_faults", truth.solver_faults());
-    let gates = vec![
-        Gate::at_most("second head, auto: worst error of the brain over its default tolerance", over, 1.0),
-        Gate::at_most("second head, auto: processor time, cores", cpu_s_per_s, 2.0),
-        Gate::at_most(
-            "second head, truth: nodes limited, elements inverted and ms skipped",
-            truth.solver_faults(),
-            0.0,
-        ),
-    ];
-    Ok((row, gates))
+    row.metric("error_over_tolerance", over)
+        .metric("cpu_s_per_s", ride.cpu_s.iter().sum::<f64>() / ride.seconds)
+        .metric("solver_faults", ride.solver_faults())
+        .metric("truth_solver_faults", truth.solver_faults())
 }
 
 /// The finest run of this process: every part needs it, and it is the same for all.

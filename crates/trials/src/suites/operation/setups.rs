@@ -42,6 +42,16 @@ pub fn second_head() -> Option<String> {
     Some(format!("--ct {} --mri {} --labels {}", ct.display(), mri.display(), mask.display()))
 }
 
+/// Setups that run where a session opens a head by itself.
+pub fn elsewhere(scope: Scope) -> Vec<(&'static str, &'static str)> {
+    let by_hand = [
+        ("fine, 8000 tetrahedra", "--quality fine --tets 8000"),
+        ("fine, 12000 tetrahedra", "--quality fine --tets 12000"),
+    ];
+    let by_hand = by_hand.into_iter().filter(|_| !scope.quick);
+    [("auto", "--quality auto")].into_iter().chain(by_hand).collect()
+}
+
 /// Every setup, auto and the presets first.
 pub fn all(scope: Scope) -> Vec<Candidate> {
     let mut setups = vec![

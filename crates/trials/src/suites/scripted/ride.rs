@@ -15,7 +15,7 @@ use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{Reading, Status};
 use trepan_mesh::Surface;
 use trepan_simulator::{Options, Phase, Program, Session, SoftFrame, SolverFaults, Stages, TickInput, ToolSample};
-use trepan_volume::BoneVolume;
+use trepan_bone::BoneVolume;
 
 /// Radius around the way in within which bone is counted, mm: the hole and its rim.
 const BONE_RADIUS_MM: f32 = 8.0;
@@ -95,13 +95,18 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens the built-in case by a setup's flags, or the images that these name. The hand goes
-    /// along the plan at a site, else at the session's own.
+    /// Opens the built-in case at [`OPENING`] by a setup's flags. The hand goes along the plan at a
+    /// site, else at the session's own.
     pub fn open(scope: Scope, flags: &str, site: Option<Site>) -> Result<Self> {
-        let before_mb = held_mb();
         let Vec3 { x, y, z } = OPENING;
-        let opening = if flags.contains("--ct") { String::new() } else { format!("--opening {x},{y},{z}") };
-        let flags = format!("integrated --headless --frames-per-second 0 {opening} {flags}");
+        Self::at_own_opening(scope, &format!("--opening {x},{y},{z} {flags}"), site)
+    }
+
+    /// Opens the built-in case, or the images that the flags name, where the session opens it by
+    /// itself.
+    pub fn at_own_opening(scope: Scope, flags: &str, site: Option<Site>) -> Result<Self> {
+        let before_mb = held_mb();
+        let flags = format!("integrated --headless --frames-per-second 0 {flags}");
         let options = Options::try_parse_from(flags.split_whitespace())?;
         let session = Session::open(Program::Integrated, options, case::inputs())?;
         let site = site.unwrap_or(session.scene().site);
