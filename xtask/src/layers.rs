@@ -13,7 +13,7 @@ use std::process::Command;
 /// Crates by floor, lowest first.
 const FLOORS: [&[&str]; 6] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
-    &["volume", "mesh", "contact", "gpu"],
+    &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget", "window"],
     &["simulator"],
@@ -21,7 +21,7 @@ const FLOORS: [&[&str]; 6] = [
 ];
 
 /// Arrows within one floor, from user to used.
-const SIDEWAYS: [(&str, &str); 2] = [("mesh", "volume"), ("tled", "soft")];
+const SIDEWAYS: [(&str, &str); 3] = [("mesh", "volume"), ("bone", "volume"), ("tled", "soft")];
 
 /// Packages that only some crates may depend on.
 const KEPT: [(&str, &[&str]); 8] = [

@@ -10,7 +10,7 @@
 //! # When not to use it
 //! For single points: read the eight voxels around them.
 
-use super::BoneVolume;
+use crate::BoneVolume;
 use glam::IVec3;
 
 /// Memory for [`BoneVolume::read_between`], taken in advance.
@@ -112,8 +112,8 @@ impl BoneVolume {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::VoxelVolume;
     use trepan_geometry::Vec3;
+    use trepan_volume::VoxelVolume;
 
     #[test]
     fn nodes_lie_between_the_voxels_around_them() {

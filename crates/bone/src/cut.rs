@@ -20,7 +20,7 @@
 //! # When not to use it
 //! For bone that is taken away whole, as a lifted flap: change the CT.
 
-use super::BoneVolume;
+use crate::BoneVolume;
 use crate::stroke::BRICK;
 use bytemuck::allocation::zeroed_slice_box;
 use glam::IVec3;
@@ -42,7 +42,7 @@ const RAMP_HU: f32 = 1000.0;
 
 /// The cut beside a volume.
 #[derive(Debug)]
-pub(super) struct CutField {
+pub(crate) struct CutField {
     /// Nodes along a voxel's edge.
     pub nodes: i32,
     /// Bricks along each axis, one beyond the grid on either side among them. At the end of a CT
@@ -170,13 +170,13 @@ impl BoneVolume {
     /// The density that a voxel of `hu` shows when the cut at its centre is `value`. It is under a
     /// ramp through the isovalue at the surface of the cut, 1000 HU a voxel.
     #[inline]
-    pub(super) fn ramped(&self, hu: i16, value: i16) -> i16 {
+    pub(crate) fn ramped(&self, hu: i16, value: i16) -> i16 {
         if value == 0 {
             return hu;
         }
         let under = (RAMP_HU / self.cut.nodes as f32 * cut_depth(value)).round() as i32;
         let most = i32::from(self.isovalue) - if value >= CUT_SURFACE { under.max(1) } else { under };
-        hu.min(most.clamp(super::AIR_HU.into(), i16::MAX.into()) as i16)
+        hu.min(most.clamp(trepan_volume::AIR_HU.into(), i16::MAX.into()) as i16)
     }
 
     /// Whether anything was cut within 4 nodes of the box of nodes from `low` to `high`, inclusive.
@@ -219,7 +219,7 @@ impl BoneVolume {
     }
 
     /// The brick of voxels in which a node lies, or the nearest one.
-    pub(super) fn brick_of_node(&self, node: IVec3) -> usize {
+    pub(crate) fn brick_of_node(&self, node: IVec3) -> usize {
         self.brick_of((node / self.cut.nodes).clamp(IVec3::ZERO, self.last()))
     }
 }
@@ -290,7 +290,7 @@ impl Drop for CutWriter<'_> {
 
 impl BoneVolume {
     /// Tells readers that a brick of nodes has changed.
-    pub(super) fn note_cut(&self, brick: IVec3) {
+    pub(crate) fn note_cut(&self, brick: IVec3) {
         let low = BRICK as i32 * brick;
         // A brick of nodes lies within one brick of voxels, since its edge divides theirs.
         let version = &self.cut_versions[self.brick_of_node(low)];
@@ -301,7 +301,8 @@ impl BoneVolume {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AIR_HU, Undone, VoxelVolume};
+    use crate::Undone;
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     const MIDDLE: Vec3 = Vec3::splat(7.3);
 

@@ -159,7 +159,8 @@ impl FlapSearch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AIR_HU, Piece, VoxelVolume};
+    use crate::Piece;
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     fn plate() -> BoneVolume {
         let mut ct = VoxelVolume::isotropic([40, 36, 9], Vec3::ZERO, 1.0, AIR_HU);

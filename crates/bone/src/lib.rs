@@ -28,22 +28,29 @@
 //! # When not to use it
 //! For volumes that do not change: use [`VoxelVolume`].
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod between;
 mod cut;
+mod flap;
+mod piece;
+mod stroke;
 mod undo;
 
 pub use between::BetweenScratch;
 pub use cut::{CUT_STEPS, CUT_SURFACE, CutWriter, cut_depth};
+pub use flap::{FlapSearch, FlapState};
+pub use piece::Piece;
+pub use stroke::{BRICK, MAX_STROKE_BRICKS, MAX_STROKES, Undone};
 
-use crate::VoxelVolume;
-use crate::stroke::{BRICK, Strokes};
+use crate::stroke::Strokes;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicU64, Ordering};
 use trepan_geometry::{Aabb, Vec3};
-
-/// Density of air, HU, by definition: used outside the grid and for removed bone.
-pub const AIR_HU: i16 = -1000;
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 /// The number of the next volume.
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);

@@ -5,8 +5,8 @@
 //! voxels: for the end of a session, not for a tick.
 
 use crate::BoneVolume;
-use crate::component::Components;
 use glam::IVec3;
+use trepan_volume::Components;
 
 /// A connected piece of bone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +50,8 @@ impl Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AIR_HU, VoxelVolume};
     use trepan_geometry::Vec3;
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     /// A plate with an isolated voxel beside it.
     fn plate() -> BoneVolume {

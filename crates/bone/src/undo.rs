@@ -1,7 +1,8 @@
 //! Records strokes of the burr and undoes them brick by brick.
 
-use super::{BRICK, BoneVolume, CUT_SURFACE};
+use crate::stroke::BRICK;
 use crate::stroke::Undone;
+use crate::{BoneVolume, CUT_SURFACE};
 use glam::IVec3;
 use std::sync::atomic::{AtomicI16, Ordering};
 use trepan_geometry::Vec3;
@@ -124,7 +125,8 @@ impl BoneVolume {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AIR_HU, MAX_STROKE_BRICKS, MAX_STROKES, VoxelVolume};
+    use crate::{MAX_STROKE_BRICKS, MAX_STROKES};
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     fn block() -> VoxelVolume<i16> {
         let mut volume = VoxelVolume::isotropic([20, 18, 17], Vec3::new(-9.0, 4.0, 1.0), 0.5, AIR_HU);

@@ -4,9 +4,10 @@ use glam::Vec3;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
+use trepan_bone::BoneVolume;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::{Camera, Casting, Frame, Hit, Painter, ProcessorRenderer, Renderer, SceneData};
-use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
+use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -17,7 +18,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (middle, data) = (bone.bounds().centre(), SceneData { bone: Some(bone), brain: None, mri: None, tint: None });
     let views = [Vec3::Y, Vec3::new(0.7, 0.6, 0.9), Vec3::X, Vec3::new(-0.5, 1.0, 0.2)];
     let frames = views.map(|v| Frame::of(Camera::viewed_from(middle, v, 450.0)));
-
     let mut processor = ProcessorRenderer::new(&data, size)?;
     let mut hits = Vec::new();
     for frame in &frames {

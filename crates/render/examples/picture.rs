@@ -4,11 +4,12 @@
 use glam::{DAffine3, Vec3};
 use std::path::Path;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Gpu, Prefer};
 use trepan_mesh::lattice;
 use trepan_render::{Camera, Frame, Renderer, SceneData};
-use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
+use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -16,8 +16,9 @@
 use crate::drilled::{Drilled, LEAP};
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
+use trepan_bone::{BRICK, BoneVolume};
 use trepan_geometry::Aabb;
-use trepan_volume::{AIR_HU, BRICK, BoneVolume};
+use trepan_volume::AIR_HU;
 
 /// Distance stored for a ray that hits nothing.
 pub(crate) const NOTHING: f32 = 1e30;

@@ -12,7 +12,7 @@
 //! with the cut and does not shrink. About 20 µs a brick that has changed.
 
 use glam::IVec3;
-use trepan_volume::{BoneVolume, CUT_STEPS, CUT_SURFACE};
+use trepan_bone::{BoneVolume, CUT_STEPS, CUT_SURFACE};
 
 /// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
 pub(crate) const LEAP: usize = 4;

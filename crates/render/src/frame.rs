@@ -3,9 +3,10 @@
 use crate::{Camera, Cut, Overlay, Paint, Stereo};
 use glam::{IVec3, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Tool};
 use trepan_mesh::TetMesh;
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// The scene data that stays constant during a session.
 #[derive(Clone, Debug)]

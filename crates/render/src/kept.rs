@@ -5,8 +5,8 @@ use crate::border::Border;
 use crate::frame::{SceneData, bounds};
 use crate::mri::Signals;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Aabb;
-use trepan_volume::BoneVolume;
 
 /// The data that the processor needs to take over.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@
 //! # Practice
 //! Create a [`Renderer`] once per scene, then [`draw`](Renderer::draw) a [`Frame`] and take its
 //! texture or its [`Image`]. Drilling is read through
-//! [`BoneVolume::changed`](trepan_volume::BoneVolume::changed), up to a number of bricks a picture;
+//! [`BoneVolume::changed`](trepan_bone::BoneVolume::changed), up to a number of bricks a picture;
 //! the haptic tick is never delayed.
 //!
 //! # Sources

@@ -17,7 +17,7 @@
 
 use crate::bricks::Grid;
 use glam::{IVec3, Vec3};
-use trepan_volume::{BRICK, BoneVolume};
+use trepan_bone::{BRICK, BoneVolume};
 
 /// A numerical parameter: standard deviation of the Gaussian, mm; at least a voxel.
 const SIGMA_MM: f32 = 1.25;

@@ -5,9 +5,10 @@ mod scene;
 use glam::{DVec3, IVec3, Vec2, Vec3};
 use scene::{ISO, alone, bone, device, renderer, volume};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::Faults;
 use trepan_render::{Camera, Frame, Hit, Renderer, SliceLook, View};
-use trepan_volume::{AIR_HU, BoneVolume};
+use trepan_volume::AIR_HU;
 
 /// A frame with the 3-D view only.
 fn plain(camera: Camera) -> Frame<'static> {

@@ -7,9 +7,9 @@ use glam::{IVec3, Vec2, Vec3};
 use scene::{alone, bone, device};
 use similar::similarity;
 use std::sync::Arc;
+use trepan_bone::{BoneVolume, CUT_STEPS, CUT_SURFACE};
 use trepan_gpu::Faults;
 use trepan_render::{Camera, Frame, Hit, Image, ProcessorRenderer, SliceLook, View};
-use trepan_volume::{BoneVolume, CUT_STEPS, CUT_SURFACE};
 
 const SIZE: [u32; 2] = [200, 160];
 /// Half the thickness of the plate, mm.

@@ -8,10 +8,11 @@ use cube::cube;
 use glam::Vec3;
 use scene::{ISO, alone, bone, device, volume};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::{Faults, Gpu};
 use trepan_mesh::TetMesh;
 use trepan_render::{Camera, Casting, Cut, Frame, Hit, ProcessorRenderer, SceneData, SliceLook};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 fn plain(camera: Camera) -> Frame<'static> {
     Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) }

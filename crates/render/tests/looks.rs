@@ -9,13 +9,14 @@ use glam::{DVec3, Vec3};
 use scene::{bone, device};
 use similar::similarity;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::Faults;
 use trepan_mesh::TetMesh;
 use trepan_render::{
     Camera, Cut, Frame, Image, Overlay, Paint, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo, StereoLook,
 };
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 const SIZE: [u32; 2] = [320, 240];
 

@@ -9,6 +9,7 @@ use glam::{DVec3, IVec3, Vec3};
 use scene::{alone, bone, device};
 use similar::similarity;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Faults, GpuError};
 use trepan_mesh::TetMesh;
@@ -16,7 +17,7 @@ use trepan_render::{
     Camera, Casting, Frame, Image, Overlay, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo,
     StereoLook,
 };
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 /// A shell with a hole that shows the brain in it, and a burr at the hole.
 fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>, Frame<'static>) {

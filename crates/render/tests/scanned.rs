@@ -2,9 +2,10 @@
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::adapter_for_tests;
 use trepan_render::{Camera, Frame, Hit, ProcessorRenderer, Renderer, SceneData, SliceLook, View};
-use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
+use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample};
 
 /// Voxel edges of the built-in head's CT, mm.
 const VOXEL_MM: DVec3 = DVec3::new(1.0, 1.0, 2.0);

@@ -5,11 +5,12 @@
 //! 1 mm/s, and `hole` through it at 2.4 mm/s, a hand that leads its burr by 2 mm.
 
 use std::time::Instant;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
-fn main() -> Result<(), trepan_volume::BoneError> {
+fn main() -> Result<(), trepan_bone::BoneError> {
     let head = head();
     println!(
         "{:<18} {:<6} {:>8} {:>8} {:>8} {:>10} {:>8}",
@@ -47,7 +48,6 @@ fn head() -> VoxelVolume<i16> {
 
 /// Radius of the skull along x, mm.
 const SKULL: f32 = 95.0;
-
 #[inline(never)]
 fn stroke(method: &Method, bone: &BoneVolume, task: &str, radius_mm: f32, ticks: u32) {
     let mut contact = method.build(&Tool::burr(radius_mm));
@@ -61,7 +61,7 @@ fn stroke(method: &Method, bone: &BoneVolume, task: &str, radius_mm: f32, ticks:
             "hole" => fed(2.4e-3),
             _ => (0.05 * t as f32 / 20.0, 0.5),
         };
-        let across = Vec3::new(20.0 * phase.sin(), 20.0 * phase.cos(), 0.0);
+        let across = 20.0 * Vec3::new(phase.sin(), phase.cos(), 0.0);
         let top = 0.65 * (SKULL * SKULL - across.x.powi(2) - (across.y / 0.95).powi(2)).sqrt();
         let tool = ToolState::at(Pose::from_translation(
             across + Vec3::Z * (top + (radius_mm + if t == 0 { 2.0 } else { -pressed })),

@@ -6,8 +6,9 @@ use crate::nodes::{Nodes, clearance};
 use crate::removal::{Pressed, RemovalLaw};
 use crate::rows::{GridBall, rows};
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::{AIR_HU, BoneVolume};
+use trepan_volume::AIR_HU;
 use wide::{f32x8, i16x8};
 
 /// A numerical parameter: fall of the ramp down to which the per-tick law cuts at the burr's

@@ -27,9 +27,9 @@
 
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Distance between stations, radii.
 const APART: f32 = 1.4;

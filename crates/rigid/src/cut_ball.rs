@@ -8,8 +8,8 @@ use crate::eight::Vec3x8;
 use crate::rows::each;
 use crate::window::wide;
 use glam::IVec3;
+use trepan_bone::{CUT_STEPS, CUT_SURFACE};
 use trepan_geometry::Vec3;
-use trepan_volume::{CUT_STEPS, CUT_SURFACE};
 use wide::{f32x8, i16x8};
 
 /// How far from its surface the cut is kept, nodes: as far as its splines reach.

@@ -172,7 +172,8 @@ mod tests {
     use crate::nodes::Nodes;
     use crate::solid::{Solid, crossing};
     use crate::surface::NEIGHBOURS;
-    use trepan_volume::{BoneVolume, CUT_STEPS, CUT_SURFACE, VoxelVolume};
+    use trepan_bone::{BoneVolume, CUT_STEPS, CUT_SURFACE};
+    use trepan_volume::VoxelVolume;
 
     /// Two balls cut from a slope of the CT, which ends some edges and discs.
     fn cut_bone() -> BoneVolume {

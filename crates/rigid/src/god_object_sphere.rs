@@ -54,9 +54,9 @@ use crate::method::{Descriptor, Extent, Method};
 use crate::removal::RemovalLaw;
 use crate::shaft::Shaft;
 use crate::{RigidContact, RigidStep};
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Aabb, Pose, Tool, ToolState, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Most discs in reach; past it the rest is counted as a fallback.
 const MAX_DISCS: usize = 8192;

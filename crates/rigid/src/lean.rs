@@ -19,8 +19,8 @@ use crate::ball::{Ball, InReach};
 use crate::disc::Disc;
 use crate::shaft::Shaft;
 use crate::surface::Discs;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::BoneVolume;
 
 /// How far the tool may move before discs are gathered anew, voxels.
 const AHEAD: f32 = 1.5;

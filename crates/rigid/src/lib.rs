@@ -13,12 +13,13 @@
 //! # Practice
 //! [`Method::RECOMMENDED`] is [`god_object_sphere`]; [`rivals`] has the others, and [`Method::all`]
 //! lists all. A step does not allocate, lock or wait; the same bone and path give the
-//! same bytes. The step is the one writer of the [`BoneVolume`](trepan_volume::BoneVolume).
+//! same bytes. The step is the one writer of the [`BoneVolume`](trepan_bone::BoneVolume).
 //!
 //! ```
 //! use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 //! use trepan_rigid::{Method, RigidStep};
-//! use trepan_volume::{BoneVolume, VoxelVolume};
+//! use trepan_bone::BoneVolume;
+//! use trepan_volume::VoxelVolume;
 //!
 //! // Bone below z = 0: the density falls through 400 HU there, with 1000 HU per voxel.
 //! let mut ct = VoxelVolume::isotropic([24, 24, 24], Vec3::new(-6.0, -6.0, -9.0), 0.5, 0);
@@ -33,7 +34,7 @@
 //! let tool = ToolState::at(Pose::from_translation(Vec3::Z * 1.7));
 //! contact.step(&bone, &tool, false, 1.0, &mut out);
 //! assert!((out.manifold.depth_mm - 0.3).abs() < 0.01 && out.manifold.normal.z > 0.999);
-//! # Ok::<(), trepan_volume::BoneError>(())
+//! # Ok::<(), trepan_bone::BoneError>(())
 //! ```
 //!
 //! # When not to use it

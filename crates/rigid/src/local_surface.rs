@@ -15,8 +15,8 @@ use crate::disc::{Disc, EXTENT};
 use crate::nodes::Nodes;
 use crate::surface::Discs;
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Tool, Vec3};
-use trepan_volume::BoneVolume;
 
 /// How far the tool may move before discs are gathered anew, nodes.
 const AHEAD: f32 = 0.5;
@@ -143,7 +143,8 @@ mod tests {
     use super::*;
     use crate::nodes::clearance;
     use glam::IVec3;
-    use trepan_volume::{CUT_STEPS, CUT_SURFACE, VoxelVolume};
+    use trepan_bone::{CUT_STEPS, CUT_SURFACE};
+    use trepan_volume::VoxelVolume;
 
     #[test]
     fn discs_in_a_ball_shaped_hole_lie_on_the_ball() {

@@ -3,7 +3,7 @@
 use crate::solid::Fine;
 use crate::window::{Shown, Window};
 use glam::IVec3;
-use trepan_volume::BoneVolume;
+use trepan_bone::BoneVolume;
 
 /// How far behind its surface a cut stops a tool, mm, at least: a burr would lock in its bore.
 const CLEARANCE_MM: f32 = 0.004;

@@ -21,7 +21,7 @@
 //!
 //! The burr moves its ball from the proxy towards the device, by the s at which the bone that
 //! opens costs what the load has earned, and the ball's swept volume joins the cut
-//! ([`cut_at`](trepan_volume::BoneVolume::cut_at)). So the cut is the burr's own shape, whatever
+//! ([`cut_at`](trepan_bone::BoneVolume::cut_at)). So the cut is the burr's own shape, whatever
 //! the voxels.
 //! ```text
 //! Σ price (taken after s - taken before) node³ = earned        covered: ½ + d, cut to 0..1

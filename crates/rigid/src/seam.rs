@@ -1,9 +1,9 @@
 //! The seam between the haptic tick and the methods: one call a tick, plain data out.
 
 use crate::removal::RemovalLaw;
+use trepan_bone::BoneVolume;
 use trepan_contact::ContactManifold;
 use trepan_geometry::{Pose, ToolState};
-use trepan_volume::BoneVolume;
 
 /// A tool against bone.
 pub trait RigidContact: Send {

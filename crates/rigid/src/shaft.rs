@@ -16,8 +16,8 @@
 //! Grid coordinates. About a microsecond for a shaft in the air, one load per voxel near bone.
 
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Tool, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Length of a slice, voxels.
 const SLICE: f32 = 8.0;

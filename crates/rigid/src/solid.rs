@@ -2,8 +2,8 @@
 
 use crate::window::Window;
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::BoneVolume;
 use wide::i16x8;
 
 /// Fall of the cut along an edge under which a steeper edge is nearby, HU. The cosine of a

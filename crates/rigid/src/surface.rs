@@ -30,8 +30,8 @@ use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
 use crate::solid::{Field, Fine, Solid, crossing, is_grazed};
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::BoneVolume;
 
 /// While bone goes away normals are found anew in turns of so many ticks; in so few a burr takes
 /// some hundredths of a voxel.

@@ -18,7 +18,7 @@
 use crate::eight::Vec3x8;
 use crate::rows::each;
 use glam::IVec3;
-use trepan_volume::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
+use trepan_bone::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
 use wide::{f32x8, i16x8, i32x8};
 
 /// Largest edge, log2: 128 voxels, 4 MB.

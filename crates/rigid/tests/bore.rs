@@ -2,10 +2,11 @@
 
 mod common;
 use common::{ISO, directions};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 const STIFFNESS: f32 = 2.0;
 const BONE_MM: f32 = 6.0;

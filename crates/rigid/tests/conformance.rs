@@ -2,10 +2,10 @@
 
 mod common;
 use common::{at, bone, directions, held, walk};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::rivals::{centre_line, exposed_faces, mesh_shell, pointshell, thesis, voxel_sum};
 use trepan_rigid::{Extent, Method, RigidContact, RigidStep};
-use trepan_volume::BoneVolume;
 
 const THESIS: [Method; 2] = [Method::of(&thesis::METHOD), Method::of(&thesis::AS_PRINTED)];
 /// Methods that take voxels which the tool's surface goes through, whole: half the diagonal of a
@@ -250,7 +250,7 @@ fn what_others_change_and_an_undone_stroke_are_noticed() {
             }
         });
         assert_eq!(touched(contact.as_mut()), 0.0, "{name} feels what is gone");
-        assert!(matches!(bone.undo_stroke(), trepan_volume::Undone::Bricks(_)));
+        assert!(matches!(bone.undo_stroke(), trepan_bone::Undone::Bricks(_)));
         assert_eq!(touched(contact.as_mut()), before, "{name} misses what came back");
     }
 }

@@ -2,10 +2,10 @@
 
 mod common;
 use common::{bone, held};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Tool, ToolState, Vec3};
 use trepan_rigid::rivals::surface_vertices;
 use trepan_rigid::{Extent, Method, RigidContact, RigidStep, god_object_sphere};
-use trepan_volume::BoneVolume;
 
 const WITH_SHAFT: Method = Method::of(&god_object_sphere::WITH_SHAFT);
 const VERTICES: Method = Method::of(&surface_vertices::METHOD);

@@ -1,10 +1,11 @@
 //! A method in one file, of another crate.
 
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Descriptor, Extent, Method, RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Pushes up by half a millimetre where the tip is in bone.
 #[derive(Default)]

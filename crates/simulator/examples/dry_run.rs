@@ -4,12 +4,13 @@
 //! `cargo run --release -p trepan-simulator --example dry_run`
 
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::Vec3;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Script, Site};
 use trepan_simulator::{HapticConfig, HapticStage, Program, TickInput};
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (bone, brain) = head()?;
@@ -42,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Makes bone from 60 to 66 mm around the origin and brain within 58 mm.
-fn head() -> Result<(BoneVolume, DistanceField), trepan_volume::BoneError> {
+fn head() -> Result<(BoneVolume, DistanceField), trepan_bone::BoneError> {
     let n = 140;
     let mut ct = VoxelVolume::isotropic([n, n, n], Vec3::splat(-69.5), 1.0, -1000i16);
     let mut mask = ct.map(|_| 0u8);

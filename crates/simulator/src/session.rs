@@ -38,6 +38,7 @@ use crate::training::{Guide, Lesson};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::channel;
+use trepan_bone::BoneVolume;
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Script;
@@ -45,7 +46,7 @@ use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse, spacemouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording, SceneWriter};
 use trepan_render::Camera;
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 use trepan_window::Stage;
 
 /// A session that is ready to run.

@@ -21,13 +21,13 @@ use crate::stages::second_hand::SecondHand;
 use crate::stages::settling::Settling;
 use crate::stages::solver_step::SolverStage;
 use std::sync::{Arc, OnceLock};
+use trepan_bone::{BoneVolume, Piece};
 use trepan_budget::Bone;
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
 use trepan_measurements::support;
 use trepan_mesh::TetMesh;
 use trepan_rigid::{Extent, Method};
-use trepan_volume::{BoneVolume, Piece};
 use trepan_voxel_size::{CostModel, Measures};
 
 /// Patient, plan, settings and models of a session.

@@ -23,7 +23,7 @@ pub fn largest_component(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
 }
 
 /// The pieces of a mask, as runs along x.
-pub(crate) struct Components {
+pub struct Components {
     runs: Vec<Run>,
     /// Voxels of the piece whose root is this run; 0 for the others.
     sizes: Vec<usize>,

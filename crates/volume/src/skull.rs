@@ -13,6 +13,9 @@ use crate::component::Components;
 use crate::{ReadError, Sample, VoxelVolume};
 use std::path::Path;
 
+/// Density of air, HU, by definition: outside a grid and for removed bone.
+pub const AIR_HU: i16 = -1000;
+
 /// Lowest isovalue that [`bone_isovalue`] returns, HU.
 pub const LEAST_ISOVALUE: i16 = 300;
 

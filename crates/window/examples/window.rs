@@ -2,17 +2,17 @@
 
 use glam::{DVec3, IVec3, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Gpu, GpuError, Prefer};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
-use trepan_window::{self as window, Capture, Panel, Session, Start, WindowInput};
+use trepan_volume::{AIR_HU, VoxelVolume};
+use trepan_window::{Capture, Panel, Session, Start, WindowInput, run};
 
 /// Removes the voxels that the burr touches while the pedal is down.
 struct Drill {
     bone: Arc<BoneVolume>,
     world_from_tool: Pose,
-    drilling: bool,
     seconds: f64,
     removed: usize,
     until: f64,
@@ -22,20 +22,17 @@ const RADIUS_MM: f32 = 4.0;
 
 impl Session for Drill {
     fn update(&mut self, input: &WindowInput) -> Panel {
-        (self.world_from_tool, self.drilling, self.seconds) = (input.world_from_tool, input.pedal, input.seconds);
+        (self.world_from_tool, self.seconds) = (input.world_from_tool, input.seconds);
         let tip = self.world_from_tool.translation;
         let touched = touched(&self.bone, tip);
-        if self.drilling {
+        if input.pedal {
             touched.iter().for_each(|&voxel| self.bone.set_hu(voxel, AIR_HU));
             self.removed += touched.len();
         }
         Panel {
             phase: "Practice".into(),
-            tool: "burr 8 mm".into(),
-            by_hand: true,
-            drilling: self.drilling,
+            drilling: input.pedal,
             force_n: touched.len() as f32 * 0.01,
-            force_limit_n: 3.3,
             values: vec![("bone removed".into(), format!("{} mm³", self.removed))],
             warnings: (tip.length() < 28.0).then(|| "The burr is deeper than 12 mm".into()).into_iter().collect(),
             finished: self.seconds > self.until,
@@ -60,7 +57,6 @@ fn touched(bone: &BoneVolume, tip: Vec3) -> Vec<IVec3> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let until = std::env::args().nth(1).map_or(Ok(f64::INFINITY), |a| a.parse())?;
-    let by_processor = std::env::args().nth(2).is_some_and(|a| a == "processor");
     let mut ball = VoxelVolume::isotropic([96; 3], Vec3::splat(-47.5), 1.0, AIR_HU);
     for at in 0..ball.data.len() {
         let centre: DVec3 = ball.centre_of([at % 96, at / 96 % 96, at / 9216]);
@@ -68,13 +64,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let bone = Arc::new(BoneVolume::new(&ball, 400)?);
     let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
-    let device = if by_processor { Err(GpuError::NoAdapter) } else { Gpu::open(Prefer::Hardware) };
+    let device = if std::env::args().nth(2).is_some_and(|a| a == "processor") {
+        Err(GpuError::NoAdapter)
+    } else {
+        Gpu::open(Prefer::Hardware)
+    };
     let painter = Painter::on(device, &data, [640, 480])?;
     let rotation = Quat::from_rotation_arc(Vec3::Z, Vec3::new(0.4, 0.8, 0.5).normalize());
     let world_from_tool = Pose::from_parts(Vec3::new(0.0, 38.0, 12.0), rotation);
-    let start = Start::with(Camera::viewed_from(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.4), 200.0), world_from_tool);
-    let drill = Drill { bone, world_from_tool, drilling: false, seconds: 0.0, removed: 0, until };
-    let closed = window::run("Trepan", painter, drill, start);
+    let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.4), 200.0);
+    let drill = Drill { bone, world_from_tool, seconds: 0.0, removed: 0, until };
+    let closed = run("Trepan", painter, drill, Start::with(camera, world_from_tool));
     println!("{} drew for {:.1} s: {:?}", closed.renderer.name(), closed.session.seconds, closed.result);
     Ok(closed.result?)
 }

@@ -162,7 +162,7 @@ fn ring(axis: Vec3, radius_mm: f32) -> impl Iterator<Item = Vec3> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use crate::*;
+    use super::*;
 
     /// A slab of bone from z = -6 to 0 mm with a hole of 3 mm radius. The brain lies below -7 mm.
     pub fn slab(ray: &Ray) -> Option<SurfaceHit> {

@@ -8,10 +8,11 @@ use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, LazyRenderer};
 use glam::Vec3;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Tool};
 use trepan_gpu::{GpuError, Texture};
 use trepan_render::{Painter, RenderError, SceneData, SliceLook, View};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// A session that returns a given panel and stores its inputs.
 #[derive(Default)]

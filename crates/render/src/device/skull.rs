@@ -17,8 +17,8 @@ use crate::bricks::{Followed, Grid, Leaps, densities};
 use crate::scene::Scene;
 use crate::smooth::Smooth;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::{Bindings, Buffer, Format, Gpu, Kernel, Recorder, Resource, Slot, Texture, TextureSpec};
-use trepan_volume::BoneVolume;
 
 /// Bytes of densities uploaded at once while loading.
 const LOAD_BYTES: usize = 16 << 20;

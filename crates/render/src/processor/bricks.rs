@@ -14,7 +14,7 @@ use glam::{BVec3A, IVec3, Vec3, Vec3A, Vec4};
 use std::array;
 use std::ops::Range;
 use std::sync::Arc;
-use trepan_volume::BoneVolume;
+use trepan_bone::BoneVolume;
 
 const NUDGE: f32 = 1e-3;
 const MOST_STEPS: u32 = 8192;

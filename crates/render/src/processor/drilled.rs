@@ -6,7 +6,8 @@ use crate::bricks::{Grid, Leaps};
 use crate::drilled::{FAR, LEAP};
 use crate::mix::{least, trilinear};
 use glam::{IVec3, Vec3, Vec3A, Vec4};
-use trepan_volume::{AIR_HU, CUT_STEPS};
+use trepan_bone::CUT_STEPS;
+use trepan_volume::AIR_HU;
 
 /// Steepness with which a cut lowers the density that is shown, HU a node.
 const RAMP_HU: f32 = 1000.0;

@@ -2,10 +2,11 @@
 
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::Gpu;
 pub use trepan_gpu::adapter_for_tests as device;
 use trepan_render::{Renderer, SceneData};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 pub const ISO: i16 = 400;
 

@@ -23,9 +23,9 @@ use crate::removal::RemovalLaw;
 use crate::rows::each;
 use crate::{RigidContact, RigidStep};
 use glam::{DVec3, IVec3};
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Aabb, Pose, Tool, ToolState};
-use trepan_volume::BoneVolume;
 
 /// Most triangles in reach; the rest is counted as a fallback.
 const MAX_TRIANGLES: usize = 1 << 16;

@@ -38,9 +38,9 @@ use crate::shaft::Shaft;
 use crate::window::wide;
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
+use trepan_bone::{BRICK, BoneVolume};
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
-use trepan_volume::{BRICK, BoneVolume};
 use wide::{f32x8, i16x8};
 
 /// Stiffness k that damping is measured against, N/mm: the caller's.

@@ -27,9 +27,9 @@ use super::traverse::first_bone;
 use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Most vertices on a shaft.
 const MAX_VERTICES: usize = 512;

@@ -40,9 +40,10 @@ use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::surface::NEIGHBOURS;
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
-use trepan_volume::{AIR_HU, BoneVolume};
+use trepan_volume::AIR_HU;
 
 struct Faces {
     shell: Shell,

@@ -14,9 +14,9 @@ use crate::nodes::Nodes;
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Penetration of a flat wall at which the force of every rival is that of the caller's spring, mm:
 /// 1 N at 2 N/mm. A rival whose force is not in proportion to the depth is softer above, stiffer

@@ -16,8 +16,8 @@
 use super::traverse::clipped;
 use crate::rows::each;
 use glam::{IVec3, Mat3};
+use trepan_bone::{BRICK, BoneVolume};
 use trepan_geometry::{Aabb, Vec3};
-use trepan_volume::{BRICK, BoneVolume};
 
 /// Levels of a tree of two to the power of so many bricks.
 const MAX_DEPTH: usize = 48;

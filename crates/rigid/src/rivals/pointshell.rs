@@ -44,9 +44,9 @@ use super::shell::Shell;
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Tool, ToolState, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Points up to which the sum is not reduced.
 const FULL_SUM: f32 = 10.0;

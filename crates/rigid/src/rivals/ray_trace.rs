@@ -26,9 +26,9 @@ use crate::RigidStep;
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
-use trepan_volume::BoneVolume;
 
 struct Rays {
     shell: Shell,

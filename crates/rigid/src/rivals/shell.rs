@@ -11,8 +11,8 @@
 
 use crate::eight::Vec3x8;
 use glam::{IVec3, Mat3};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pointshell, Pose, Vec3};
-use trepan_volume::BoneVolume;
 use wide::{f32x8, i32x8};
 
 /// Points of a group.

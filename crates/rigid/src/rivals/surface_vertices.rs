@@ -36,9 +36,9 @@ use crate::RigidStep;
 use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use core::f32::consts::TAU;
+use trepan_bone::BoneVolume;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Most rings of vertices on a shaft.
 const MAX_RINGS: usize = 512;

@@ -9,8 +9,8 @@
 //! The line rules, for tools wider than a cavity: they pass bone that lies beside the line.
 
 use super::traverse::{clipped, first_bone};
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::BoneVolume;
 
 /// How the way is searched for bone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -38,9 +38,9 @@ use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_contact::{Contact, GodObject, Plane};
 use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
-use trepan_volume::BoneVolume;
 
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,8 +18,8 @@
 //! J. Amanatides, A. Woo, *A fast voxel traversal algorithm for ray tracing*, Eurographics 1987.
 
 use glam::{DVec3, IVec3};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Vec3};
-use trepan_volume::BoneVolume;
 
 /// Calls `visit` with each voxel on the line from `from` to `to`, in grid coordinates with voxel
 /// centres at whole numbers. It gets the share of the way at which the voxel is entered, and

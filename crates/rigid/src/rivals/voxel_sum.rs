@@ -45,9 +45,9 @@ use crate::rows::{GridBall, rows};
 use crate::window::wide;
 use core::f32::consts::PI;
 use glam::IVec3;
+use trepan_bone::{BRICK, BoneVolume};
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_volume::{BRICK, BoneVolume};
 use wide::f32x8;
 
 /// Density over and under the isovalue within which a voxel is partly bone, HU.

@@ -1,9 +1,10 @@
 //! Synthetic bone with known truth.
 #![allow(dead_code, reason = "each test file uses its share")]
 
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, ToolState, Vec3};
 use trepan_rigid::{RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 pub const ISO: i16 = 400;
 

@@ -11,9 +11,10 @@
 //! To plan a real operation: vessels, sinuses and eloquent cortex are ignored.
 
 use glam::Vec2;
+use trepan_bone::{BoneVolume, FlapSearch};
 use trepan_geometry::{Quat, Vec3};
 use trepan_haptics::script::{Rim, Site};
-use trepan_volume::{BoneVolume, FlapSearch, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Points of an outline.
 const RIMS: usize = 48;

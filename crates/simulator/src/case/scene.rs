@@ -8,12 +8,13 @@ use crate::program::Program;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, IVec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::{Anchor, Body, Material, Membrane};
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.
 const FIXED_BY_BONE_MM: f32 = support::BASE_REACH.f32();

@@ -20,11 +20,12 @@ use crate::settings::Source;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, DVec3, Vec2};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Site;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 use trepan_window::{Amount, Choosable, Drag, Item, Page, Picture};
 
 /// Width and height of the picture of the head, pixels.

@@ -12,10 +12,10 @@ use crate::show::picture::first_view;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData, SliceLook};
-use trepan_volume::BoneVolume;
 use trepan_window::{Capture, Panel, Session, Stage, Start, WindowInput};
 
 /// Share of the picture's pixels along an edge.

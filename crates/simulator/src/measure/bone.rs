@@ -15,12 +15,13 @@
 
 use crate::run::clock::Clock;
 use glam::{DAffine3, DVec3};
+use trepan_bone::BoneVolume;
 use trepan_budget::{Bone, Scene};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone as ExactBone, Scan};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
+use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample};
 
 /// Voxel edges, mm.
 const SPACINGS: [f64; 10] = [0.35, 0.42, 0.5, 0.6, 0.75, 0.85, 1.0, 1.25, 1.5, 2.0];

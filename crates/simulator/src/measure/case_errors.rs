@@ -31,13 +31,13 @@ use crate::ingredients::Element;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_budget::{
     Bone, Kind, Machine, Picture, PowerLaw, Row, Rows, Scene, Tissue, TissueForce, bone_cores, bone_error_n,
     holds_walls, picture_cores, tissue_cores,
 };
 use trepan_geometry::Vec3;
 use trepan_rigid::Method;
-use trepan_volume::BoneVolume;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.
 const FORM: u32 = 19;

@@ -11,6 +11,7 @@ use crate::run::clock::Clock;
 use crate::tissue_class::TissueClass;
 use std::f32::consts::TAU;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_budget::Machine;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile, units};
 use trepan_mesh::Surface;
@@ -18,7 +19,7 @@ use trepan_render::{Camera, Frame, ProcessorRenderer, SceneData, SliceLook};
 use trepan_rigid::{Method, RigidStep};
 use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 /// Calls per median.
 const CALLS: usize = 400;

@@ -3,10 +3,10 @@
 
 use crate::run::clock::Clock;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_budget::{Picture, Scene};
 use trepan_geometry::Vec3;
 use trepan_render::{Camera, Casting, Frame, Image, ProcessorRenderer, RenderError, SceneData, SliceLook};
-use trepan_volume::BoneVolume;
 
 /// Resolutions along an edge, as shares of the full picture's.
 const DETAILS: [f64; 9] = [0.25, 0.3, 0.35, 0.42, 0.5, 0.6, 0.7, 0.85, 1.0];

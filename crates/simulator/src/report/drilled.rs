@@ -22,8 +22,9 @@ use glam::{DVec3, IVec3, USizeVec3};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use trepan_bone::{BetweenScratch, BoneVolume, cut_depth};
 use trepan_geometry::Vec3;
-use trepan_volume::{AIR_HU, BetweenScratch, BoneVolume, VoxelVolume, cut_depth};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 /// A numerical parameter: density from which a voxel may hold some bone, HU, above soft tissue.
 const DENSE_HU: i16 = 100;
@@ -266,8 +267,9 @@ fn spread(ct: &VoxelVolume<i16>, part: &Part, shares: &mut [Option<f32>]) {
 mod tests {
     use super::*;
     use glam::{DAffine3, DMat3};
+    use trepan_bone::{CUT_STEPS, CUT_SURFACE};
     use trepan_mesh::isosurface;
-    use trepan_volume::{CUT_STEPS, CUT_SURFACE, Grid, Interpolation, resample};
+    use trepan_volume::{Grid, Interpolation, resample};
 
     /// Makes a plate of bone 6 mm thick with marrow in its middle, in soft tissue. The image is
     /// blurred as by a scanner, on an oblique grid.

@@ -15,9 +15,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
+use trepan_bone::BoneVolume;
 use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
-use trepan_volume::{BoneVolume, VoxelVolume, write_beside};
+use trepan_volume::{VoxelVolume, write_beside};
 
 /// Files that a session writes into its folder, besides pictures.
 const NAMES: [&str; 14] = [

@@ -19,8 +19,9 @@
 use crate::case::plan::Plan;
 use glam::IVec3;
 use serde::Serialize;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Overlap and surface distance of the removed and the planned bone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -14,8 +14,8 @@ use crate::uncertainty::Bands;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
+use trepan_bone::Piece;
 use trepan_contact::GuardCounters;
-use trepan_volume::Piece;
 
 /// The whole file.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -27,10 +27,11 @@ use glam::IVec3;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_link::cell::Reader;
 use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Session time between two shots, ms.
 pub(crate) const SHOT_MS: f64 = 1000.0 / 30.0;
@@ -229,8 +230,9 @@ pub(crate) mod tests {
     use super::*;
     use crate::program::Program;
     use crate::stages::haptic_tick::ToolSample;
+    use trepan_bone::CUT_SURFACE;
     use trepan_geometry::{Pose, ToolState};
-    use trepan_volume::{AIR_HU, CUT_SURFACE};
+    use trepan_volume::AIR_HU;
 
     /// Returns the view of a tool at the origin.
     pub(crate) fn view(time_ms: f64) -> View {

@@ -16,10 +16,11 @@
 use crate::case::plan::Plan;
 use crate::report::regions::touched;
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Tool, Vec3};
 use trepan_link::wire::TickRecord;
 use trepan_render::Paint;
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 const SKY: [f32; 3] = [86.0, 180.0, 233.0];
 const GREEN: [f32; 3] = [0.0, 158.0, 115.0];

@@ -19,11 +19,11 @@ use crate::show::window::{self, Opened, Shown};
 use crate::stages::second_hand::SecondView;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::{Camera, Frame, Image, Painter};
-use trepan_volume::BoneVolume;
 use trepan_window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
 
 /// Largest number of voxels and nodes written per picture: some 10 ms.

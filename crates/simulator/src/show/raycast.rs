@@ -10,9 +10,9 @@ use crate::run::View;
 use crate::session_setup::SessionSetup;
 use crate::stages::ahead::{bone_ahead_mm, density};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Vec3};
 use trepan_mesh::Surface;
-use trepan_volume::BoneVolume;
 use trepan_window::{Panel, Ray, SurfaceHit};
 
 /// Distance from the tool within which short rays meet the brain, mm.

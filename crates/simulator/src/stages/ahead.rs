@@ -14,8 +14,8 @@
 //! Along the axis alone, for a burr that cuts with its side: that bone is not the bone being cut.
 
 use glam::IVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_volume::BoneVolume;
 
 /// Returns the remaining bone along `direction` (unit) from `front`, mm, at most `reach_mm`.
 pub(crate) fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, reach_mm: f32) -> f32 {

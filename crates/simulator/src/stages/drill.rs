@@ -6,10 +6,10 @@
 //! `undo.rs`.
 
 use crate::stages::ahead::bone_ahead_mm;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
 use trepan_measurements::drilling;
 use trepan_rigid::RigidStep;
-use trepan_volume::BoneVolume;
 
 /// Remaining bone under which a warning is raised, mm.
 pub(crate) const THIN_MM: f32 = drilling::THIN_BONE.f32();

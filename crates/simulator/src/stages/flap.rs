@@ -11,8 +11,9 @@
 
 use crate::stages::notice::{Hindrance, What};
 use glam::IVec3;
+use trepan_bone::{BoneVolume, FlapSearch, FlapState};
 use trepan_geometry::{Buttons, Vec3};
-use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, FlapState};
+use trepan_volume::AIR_HU;
 
 /// Voxels visited by the flood fill in a tick: some 15 us.
 const FLOODED: usize = 300;
@@ -280,12 +281,12 @@ mod tests {
         assert_eq!(flap.place(), FlapPlace::Free);
         let cut = bone.snapshot();
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapLifted(mm3)]);
-        assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing, "the flap is no stroke");
+        assert_eq!(bone.undo_stroke(), trepan_bone::Undone::Nothing, "the flap is no stroke");
         assert!(flap.place() == FlapPlace::Away && flap.is_away());
         assert!(!bone.is_bone(IVec3::new(30, 30, 4)) && bone.is_bone(IVec3::new(10, 30, 4)));
         run(&mut flap, 1, none, false, false);
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapReturned]);
-        assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing);
+        assert_eq!(bone.undo_stroke(), trepan_bone::Undone::Nothing);
         assert_eq!(bone.snapshot(), cut);
         assert!(bone.undone() > 0, "who feels the bone must look anew");
         assert_eq!(run(&mut flap, 50, Buttons::PEDAL, true, true), [], "reported once");

@@ -4,8 +4,8 @@
 //! A notice is plain data, made in a tick without allocation. Its text is made where it is shown.
 
 use crate::program::{Phase, called};
+use trepan_bone::{MAX_STROKE_BRICKS, MAX_STROKES};
 use trepan_geometry::Tool;
-use trepan_volume::{MAX_STROKE_BRICKS, MAX_STROKES};
 
 /// A warning, active while its cause is present; the number is that of its bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

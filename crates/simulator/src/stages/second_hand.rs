@@ -21,12 +21,13 @@ use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, What};
 use serde::Serialize;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench};
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::{SecondRecord, TickRecord};
 use trepan_rigid::{RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, DistanceField};
+use trepan_volume::DistanceField;
 
 /// State of the second hand as it is rendered.
 #[derive(Clone, Copy, Debug)]

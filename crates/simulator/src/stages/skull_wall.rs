@@ -22,11 +22,12 @@
 use glam::IVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_contact::NodalContacts;
 use trepan_deformable::{BorderNode, ConfigError, Hollow, SlidingWall};
 use trepan_geometry::Vec3;
 use trepan_mesh::TetMesh;
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Spacing of the grid, mm.
 const SPACING_MM: f32 = 1.5;

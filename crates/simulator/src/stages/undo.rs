@@ -19,8 +19,8 @@
 //! kHz, a burr hole a few ticks. The result depends on the ticks alone; nothing allocates.
 
 use crate::stages::notice::Hindrance;
+use trepan_bone::{BoneVolume, MAX_STROKES};
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_volume::{BoneVolume, MAX_STROKES};
 
 /// Bricks exchanged in a tick: some 20 us.
 const BRICKS: usize = 8;

@@ -19,9 +19,10 @@ use crate::error::SessionError;
 use crate::recipe::Recipe;
 use search::Surroundings;
 use serde::{Deserialize, Serialize};
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Voxel edge of the skull in which an opening is searched, mm.
 pub(crate) const REFERENCE_MM: f32 = 1.0;

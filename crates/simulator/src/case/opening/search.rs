@@ -11,8 +11,9 @@
 use super::{BELOW_BONE_MM, Vec3};
 use crate::error::SessionError;
 use crate::measure::bone::over_isovalue;
+use trepan_bone::BoneVolume;
 use trepan_haptics::script::Site;
-use trepan_volume::{BoneVolume, DistanceField};
+use trepan_volume::DistanceField;
 
 /// Start of the rays, mm from the centre of the head.
 pub(super) const FAR_MM: f32 = 160.0;

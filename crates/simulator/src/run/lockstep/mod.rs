@@ -339,8 +339,9 @@ mod tests {
     use crate::stages::haptic_config::HapticConfig;
     use crate::stages::notice::{Hindrance, What};
     use std::sync::Arc;
+    use trepan_bone::BoneVolume;
     use trepan_geometry::Vec3;
-    use trepan_volume::{BoneVolume, VoxelVolume};
+    use trepan_volume::VoxelVolume;
 
     #[test]
     fn the_time_of_a_recorded_step_lies_between_its_records() {

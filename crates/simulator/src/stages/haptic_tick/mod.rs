@@ -37,13 +37,14 @@ use crate::stages::score::ScoreKeeper;
 use crate::stages::tray::Tray;
 use crate::stages::undo::Undo;
 use std::sync::Arc;
+use trepan_bone::{BoneVolume, FlapSearch};
 use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardedWrench, SurfacePatch};
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_rigid::spindle::Spindle;
 use trepan_rigid::{RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
+use trepan_volume::DistanceField;
 
 impl HapticStage {
     /// Runs a tick; notices go to `notify`. The caller applies the wrench.

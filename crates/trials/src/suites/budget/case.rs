@@ -4,13 +4,14 @@
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_simulator::measure::bone::Skull;
 use trepan_simulator::measure::tissue::Shape;
 use trepan_soft::Material;
 use trepan_volume::{
-    AIR_HU, BoneVolume, DistanceField, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, largest_component,
-    read, resample, skull_only,
+    AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, largest_component, read,
+    resample, skull_only,
 };
 
 /// Edge of the voxels that openings are looked for in and pictures are drawn of, mm.

@@ -10,9 +10,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::rc::Rc;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::Frame;
-use trepan_volume::BoneVolume;
 
 /// Share of the rays that may be wrong, and by how much, mm: half a voxel.
 const MOST_SHARE: f64 = 0.02;

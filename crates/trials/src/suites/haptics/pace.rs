@@ -16,6 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
+use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, Viscoelastic};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, units};
 use trepan_gpu::Prefer;
@@ -28,7 +29,7 @@ use trepan_render::{Camera, Frame, Painter, SceneData};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::Tled;
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Ticks per second.
 const RATES_HZ: [u32; 2] = [1000, 4000];

@@ -19,11 +19,12 @@ use crate::engine::suite::Findings;
 use crate::suites::rigid::bones::head;
 use crate::suites::{Part, Scope};
 use glam::{DVec3, IVec3};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_measurements::{Row, drilling, hands, skull};
 use trepan_rigid::removal::{Cutter, FORCE_SCALE, Pressed, RemovalLaw};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Edge of the slabs' voxels, mm.
 const VOXEL_MM: f32 = 0.5;

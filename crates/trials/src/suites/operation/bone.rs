@@ -19,13 +19,14 @@ use crate::suites::scripted::{FELT_N, OPENING, milliseconds, path};
 use crate::suites::simulators::case;
 use anyhow::Result;
 use glam::DVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Buttons, Tool, Vec3, quantile};
 use trepan_haptics::script::{Script, Site};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone, Scan};
 use trepan_rigid::{Method, RigidStep};
 use trepan_simulator::{Cache, Program, Recipe, Scene, open_case};
-use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample, skull_only};
+use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample, skull_only};
 
 /// Stiffness of the contact with bone, N/mm.
 const STIFFNESS: f64 = 2.0;

@@ -7,9 +7,10 @@ use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use glam::{DVec3, IVec3, Vec2, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::Gpu;
 use trepan_render::{Casting, Frame, Hit, View};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 /// Rays through the pixels' centres, row by row.
 pub fn rays(view: &View, [width, height]: [u32; 2]) -> impl Iterator<Item = Vec3> {

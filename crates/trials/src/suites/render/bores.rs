@@ -13,11 +13,12 @@ use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Tool, ToolState};
 use trepan_gpu::Gpu;
 use trepan_render::{Hit, Image, View};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 /// Half the thickness of the plate, mm.
 const HALF_MM: f64 = 2.6;

@@ -14,10 +14,11 @@ use crate::engine::suite::{Findings, Gate};
 use crate::suites::conditions;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
+use trepan_bone::{BoneError, BoneVolume};
 use trepan_gpu::Gpu;
 use trepan_mesh::TetMesh;
 use trepan_render::{Camera, Casting, Cut, Frame, Image, SceneData};
-use trepan_volume::{AIR_HU, BoneError, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 const SIZE: [u32; 2] = [97, 61];
 

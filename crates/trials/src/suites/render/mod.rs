@@ -14,9 +14,9 @@ pub(super) mod speed;
 use super::{Part, Scope};
 use crate::engine::suite::Findings;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::{Casting, Frame, Hit, Image, ProcessorRenderer, Renderer, SceneData, View};
-use trepan_volume::BoneVolume;
 
 /// Step of the reference along a ray, voxels.
 const FINE_VOXEL: f64 = 1.0 / 16.0;

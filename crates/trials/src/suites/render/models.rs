@@ -12,9 +12,9 @@ use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use glam::Vec3;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_gpu::Gpu;
 use trepan_render::{Camera, Cut, Frame, SceneData};
-use trepan_volume::BoneVolume;
 
 /// The table's skulls, then the brain alone, cut, and in its skull.
 pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {

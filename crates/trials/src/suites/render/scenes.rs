@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_mesh::{TetMesh, lattice};
 use trepan_render::{Camera, Frame, SliceLook};
 use trepan_volume::{
-    AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, largest_component, read, resample,
-    skull_only,
+    AIR_HU, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, largest_component, read, resample, skull_only,
 };
 
 /// Where bone begins in what is made up, HU.

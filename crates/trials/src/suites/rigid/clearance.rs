@@ -9,9 +9,9 @@
 
 use super::solid::RADIUS_MM;
 use glam::{DVec3, IVec3};
+use trepan_bone::BoneVolume;
 use trepan_contact::ContactManifold;
 use trepan_geometry::Vec3;
-use trepan_volume::BoneVolume;
 
 /// How far beyond the ball a surface is looked for, voxels: what is further counts as that far.
 const REACH: f64 = 3.0;

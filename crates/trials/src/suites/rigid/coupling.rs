@@ -21,13 +21,13 @@ use super::{map_of, passes};
 use crate::engine::picture::{Map, Outcome};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
+use trepan_bone::BoneVolume;
 use trepan_contact::{Contact, ForceGuard, ForceModel, GuardConfig, Hooke};
 use trepan_geometry::{Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::BoneVolume;
 
 /// Length of a tick in the map, ms.
 const TICK_MS: f32 = 1.0;

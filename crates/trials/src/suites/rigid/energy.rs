@@ -16,13 +16,13 @@ use super::recording::{self, Place, Task};
 use super::solid::{ISO, RADIUS_MM, held};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
+use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::BoneVolume;
 
 const HAND_TICKS: usize = 10_000;
 const MOST_MJ: f64 = 0.1;

@@ -10,9 +10,10 @@ use super::solid::{ISO, RADIUS_MM, held, voxels};
 use crate::engine::picture::Outcome;
 use crate::engine::suite::{Findings, Gate};
 use crate::suites::conditions;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, VoxelVolume};
 
 const VOXEL_MM: f32 = 0.5;
 /// Depth of an ordinary press, mm.

@@ -25,11 +25,12 @@ use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use glam::DVec3;
 use std::time::Instant;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone, Scan};
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
+use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample};
 
 const MASS_G: f64 = 250.0;
 const SPRING: f64 = 1.5;

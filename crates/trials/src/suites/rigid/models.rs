@@ -18,10 +18,11 @@ use crate::engine::timer::Samples;
 use crate::suites::{Part, Scope};
 use glam::DVec3;
 use std::time::Instant;
+use trepan_bone::{BRICK, BoneVolume};
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BRICK, BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Table 3.1: voxels along an edge of 200 mm.
 pub const CUBES: [usize; 6] = [100, 200, 300, 400, 450, 500];

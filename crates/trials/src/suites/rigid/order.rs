@@ -23,10 +23,11 @@ use super::solid::directions;
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use glam::DVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::removal::{Pressed, RemovalLaw};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Voxels, mm: h, h/2, h/4.
 const VOXELS_MM: [f64; 3] = [2.0, 1.0, 0.5];

@@ -10,6 +10,7 @@
 use super::bones::{self, HALF_MM, SKULLS};
 use super::solid::{RADIUS_MM, held};
 use std::path::{Path, PathBuf};
+use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
@@ -19,7 +20,6 @@ use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::{SessionHeader, TickRecord};
 use trepan_link::{Recorder, Recording};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::BoneVolume;
 
 /// Bone under the path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

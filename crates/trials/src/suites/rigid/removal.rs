@@ -24,10 +24,10 @@ use crate::suites::{Part, Scope};
 use glam::{DVec3, IVec3};
 use std::f64::consts::PI;
 use std::time::Instant;
+use trepan_bone::{BoneVolume, cut_depth};
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BoneVolume, cut_depth};
 
 const R: f64 = 2.0;
 const SUNK_MM: f64 = 1.0;

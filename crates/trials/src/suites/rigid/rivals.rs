@@ -26,10 +26,10 @@ use crate::engine::picture::Table;
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use glam::DVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::rivals::{burr_and_shaft, centre_line, thesis};
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::BoneVolume;
 
 /// Penetration at which stiffness is compared, mm.
 const REFERENCE_MM: f32 = 0.5;

@@ -4,10 +4,10 @@
 use super::solid::RADIUS_MM;
 use crate::engine::suite::Row;
 use std::time::{Duration, Instant};
+use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::BoneVolume;
 
 const TICK: Duration = Duration::from_micros(250);
 const TICK_MS: f32 = 0.25;

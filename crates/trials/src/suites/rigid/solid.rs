@@ -16,8 +16,9 @@
 //! along the normal, or along the axis where a normal would lead it into bone.
 
 use glam::DVec3;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pointshell, Pose, Quat, Spread, ToolState, Vec3};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Radius of the ball, mm.
 pub const RADIUS_MM: f32 = 3.0;

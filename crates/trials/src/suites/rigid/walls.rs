@@ -18,9 +18,9 @@ use super::{STIFFNESS, map_of, passes};
 use crate::engine::picture::{Map, Outcome};
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::BoneVolume;
 
 const VOXEL_MM: f64 = 0.5;
 const EDGE: usize = 48;

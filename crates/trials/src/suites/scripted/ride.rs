@@ -9,13 +9,13 @@ use anyhow::{Context, Result};
 use clap::Parser;
 use cpu_time::ProcessTime;
 use std::time::Instant;
+use trepan_bone::BoneVolume;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::{ToolState, Vec3};
 use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{Reading, Status};
 use trepan_mesh::Surface;
 use trepan_simulator::{Options, Phase, Program, Session, SoftFrame, SolverFaults, Stages, TickInput, ToolSample};
-use trepan_bone::BoneVolume;
 
 /// Radius around the way in within which bone is counted, mm: the hole and its rim.
 const BONE_RADIUS_MM: f32 = 8.0;

@@ -8,13 +8,14 @@
 //! removal are those of the default method.
 
 use super::scene::{Input, OUTPUTS, Scene};
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_measurements::{drilling, hands, sensitivity, skull};
 use trepan_rigid::god_object_sphere::{Config, GodObjectSphere};
 use trepan_rigid::removal::{Cutter, RemovalLaw};
 use trepan_rigid::spindle::Spindle;
 use trepan_rigid::{RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// Radius of the burr, mm.
 const BURR_MM: f32 = 3.0;

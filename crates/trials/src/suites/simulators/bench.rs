@@ -1,13 +1,14 @@
 //! A haptic stage with a simulated device in a simulated hand, tick by tick without a clock.
 
 use std::sync::Arc;
+use trepan_bone::{BoneVolume, FlapSearch};
 use trepan_contact::SurfacePatch;
 use trepan_geometry::ToolState;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::TickRecord;
 use trepan_simulator::{HapticConfig, HapticStage, Notice, Program, TickInput, Warning, What};
-use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
+use trepan_volume::DistanceField;
 
 /// What a tick without tissue is given.
 const NO_PATCH: SurfacePatch = SurfacePatch {

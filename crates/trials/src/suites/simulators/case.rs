@@ -2,8 +2,9 @@
 
 use anyhow::Result;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_simulator::{Cache, Inputs, Plan, Program, Recipe, Scene, TissueSource, open_case};
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 /// The built-in case's files.
 pub fn inputs() -> Inputs {

@@ -4,10 +4,10 @@
 use super::bench::Bench;
 use super::case::CaseFixture;
 use crate::engine::suite::{Findings, Gate, Row};
+use trepan_bone::Piece;
 use trepan_haptics::script::{Plan, Script};
 use trepan_haptics::simulated::HandModel;
 use trepan_simulator::{PlanComparison, Program, What};
-use trepan_volume::Piece;
 
 /// Duration of the operation, ms.
 const END_MS: f64 = 75_000.0;

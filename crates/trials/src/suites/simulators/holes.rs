@@ -14,13 +14,14 @@ use super::bench::Bench;
 use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
 use trepan_haptics::simulated::HandModel;
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_simulator::{Program, Warning};
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Edge of the piece of skull, mm.
 const EDGE_MM: f32 = 30.0;

@@ -14,11 +14,12 @@ use crate::suites::rigid::recording::{Place, Task, path};
 use crate::suites::rigid::solid::{ISO, RADIUS_MM};
 use crate::suites::{Part, Scope};
 use std::time::Instant;
+use trepan_bone::BoneVolume;
 use trepan_contact::{ForceModel, Viscoelastic};
 use trepan_geometry::{Buttons, Pointshell, Spread, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::rivals::{Ball, Sweep, thesis};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::VoxelVolume;
 
 /// The thesis's method as printed, put right, and ours.
 const METHODS: [Method; 3] = [Method::of(&thesis::AS_PRINTED), Method::of(&thesis::METHOD), Method::RECOMMENDED];

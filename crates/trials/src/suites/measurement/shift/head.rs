@@ -14,12 +14,12 @@ use crate::suites::simulators::case;
 use anyhow::{Context, Result};
 use glam::Vec3;
 use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_budget::Quality;
 use trepan_contact::NodalContacts;
 use trepan_simulator::{Cache, Ingredients, Plan, Program, RestBrain, Scene, SkullWall, TissueClass, open_case};
 use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
-use trepan_volume::BoneVolume;
 
 /// Radius of the opening, mm: the flap of the scripted operation.
 const OPENING_MM: f32 = 12.0;
