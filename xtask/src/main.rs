@@ -1,5 +1,5 @@
 //! The project's own commands: `cargo xtask test | ci | fuzz | validate | merge | compare |
-//! calibrate | bundle | layers | tidy`.
+//! calibrate | bundle | layers | tidy | size`.
 
 mod bundle;
 mod constants;
@@ -9,6 +9,7 @@ mod merge;
 mod modules;
 mod operation;
 mod prose;
+mod size;
 mod tidy;
 mod validation;
 
@@ -86,6 +87,8 @@ enum Task {
     /// Check module docs, file lengths, READMEs, examples, shader and Rust pairs, and that physical
     /// constants name a row of the register of measurements
     Tidy,
+    /// Print lines of source and tests by crate, held against the budget in crates/README.md
+    Size,
 }
 
 fn main() -> ExitCode {
@@ -125,6 +128,7 @@ fn run() -> Result<()> {
         Task::Bundle { out, .. } => bundle::gpu(&root(), &out),
         Task::Layers => report("layers", layers::check(&root())?),
         Task::Tidy => report("tidy", tidy(&root())?),
+        Task::Size => report("size", size::check(&root())?),
     }
 }
 
@@ -158,6 +162,7 @@ fn test() -> Result<()> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     report("layers", layers::check(&root())?)?;
     report("tidy", tidy(&root())?)?;
+    report("size", size::check(&root())?)?;
     cargo(
         &["clippy", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet", "--", "--deny", "warnings"],
         &[],

@@ -34,7 +34,7 @@ pub fn circles(name: &str, src: &Path) -> Result<Vec<String>> {
             path.pop();
         }
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", file.display()))?;
-        tests.extend(test_modules(&text).map(|name| [&path[..], &[name.to_owned()]].concat()));
+        tests.extend(of_tests(&text).map(|name| [&path[..], &[name.to_owned()]].concat()));
         modules.code.insert(path, without_tests(&text));
     }
     modules.code.retain(|path, _| !tests.iter().any(|test| path.starts_with(test)));
@@ -192,7 +192,7 @@ fn expand(tree: &str, before: &[String], paths: &mut Vec<ModulePath>) {
 }
 
 /// Names of the modules that a file declares for its tests, each in a file of its own.
-fn test_modules(text: &str) -> impl Iterator<Item = &str> {
+pub fn of_tests(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().map(str::trim);
     let pairs = lines.clone().zip(lines.skip(1)).filter(|(above, _)| *above == "#[cfg(test)]");
     pairs.filter_map(|(_, line)| line.strip_suffix(';')?.rsplit_once("mod ").map(|(_, name)| name))
@@ -200,7 +200,17 @@ fn test_modules(text: &str) -> impl Iterator<Item = &str> {
 
 /// The code of a file without comments and without what `#[cfg(test)]` stands before.
 pub fn without_tests(text: &str) -> String {
-    let mut code = String::new();
+    let code = outside_tests(text).into_iter().filter(|line| !line.trim_start().starts_with("//"));
+    code.flat_map(|line| [line, "\n"]).collect()
+}
+
+/// Number of lines that `#[cfg(test)]` stands before, with it.
+pub fn test_lines(text: &str) -> usize {
+    text.lines().count() - outside_tests(text).len()
+}
+
+fn outside_tests(text: &str) -> Vec<&str> {
+    let mut outside = Vec::new();
     let mut lines = text.lines();
     while let Some(line) = lines.next() {
         let trimmed = line.trim_start();
@@ -210,12 +220,11 @@ pub fn without_tests(text: &str) -> String {
             if !item.trim_end().ends_with([';', '}']) {
                 lines.by_ref().find(|line| line.starts_with(&end));
             }
-        } else if !trimmed.starts_with("//") {
-            code.push_str(line);
-            code.push('\n');
+        } else {
+            outside.push(line);
         }
     }
-    code
+    outside
 }
 
 #[cfg(test)]
@@ -247,8 +256,8 @@ mod tests {
         assert!(without_tests(test).ends_with("fn f() {}\n") && !without_tests(test).contains("super"));
         let b = "// crate::a::A\npub struct B;\n#[cfg(test)]\nmod tests {\n    use crate::a::A;\n}\n";
         assert!(found(&[("a", test), ("b", b), ("", "mod a;\nmod b;\n")]).is_empty());
-        assert_eq!(test_modules("mod a;\n#[cfg(test)]\nmod tests;\nmod b;\n").collect::<Vec<_>>(), ["tests"]);
-        assert_eq!(test_modules("#[cfg(test)]\npub(super) mod tests {\n").count(), 0);
+        assert_eq!(of_tests("mod a;\n#[cfg(test)]\nmod tests;\nmod b;\n").collect::<Vec<_>>(), ["tests"]);
+        assert_eq!(of_tests("#[cfg(test)]\npub(super) mod tests {\n").count(), 0);
         assert!(found(&[("a", "mod c;\nuse c::C;\n"), ("a::c", "use super::D;\n")]).is_empty(), "child and parent");
     }
 }

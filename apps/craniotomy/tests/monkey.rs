@@ -97,7 +97,7 @@ impl Monkey<'_> {
 
 /// Largest force on the hand in a recording over the limit of its guard, N.
 fn over_limit_n(recording: &Recording) -> f32 {
-    let peak_n: f32 = recording.header.config["device_peak_force_n"].parse().unwrap();
+    let peak_n: f32 = recording.header.config["device.peak_force_n"].parse().unwrap();
     let limit_n = if peak_n > 0.0 { peak_n } else { GuardConfig::default().max_force_n };
     recording.ticks.iter().map(|tick| tick.wrench.force.length() - limit_n).fold(f32::MIN, f32::max)
 }

@@ -72,7 +72,7 @@ fn a_planned_session_replays_bit_for_bit_without_a_plan() {
     assert!(why.contains("error in this case "), "the case itself was measured: {why}");
     let header = Recording::open(&live.path().join("session.mcap")).unwrap().header;
     assert_eq!(header.config["quality"], "auto");
-    assert_eq!(was["models"]["tissue"]["tets"].to_string(), header.config["tets"]);
+    assert_eq!(was["models"]["tissue"]["tets"].to_string(), header.config["sizes.tets"]);
 
     let device = replay_of(live.path());
     let (is, log) = operation(again.path(), "4", &["--device", &device, "--frames-per-second", "0"]);

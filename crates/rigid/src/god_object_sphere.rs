@@ -475,7 +475,6 @@ impl RigidContact for GodObjectSphere {
 
 /// The ball alone.
 pub const METHOD: Descriptor = Descriptor {
-    former_names: &["distance-field"], // version 0.1
     has_proxy: true,
     ..Descriptor::of("god-object-sphere", "Ruspini et al. 1997, Xu and Barbič 2017", |tool, _| {
         Box::new(GodObjectSphere::new(tool, Config::RECOMMENDED))
@@ -485,7 +484,6 @@ pub const METHOD: Descriptor = Descriptor {
 /// The ball and the shaft.
 pub const WITH_SHAFT: Descriptor = Descriptor {
     name: "god-object-sphere-shaft",
-    former_names: &["distance-field-shaft"], // version 0.1
     extent: Extent::BallAndShaft,
     build: |tool, _| Box::new(GodObjectSphere::new(tool, Config::WITH_SHAFT)),
     ..METHOD

@@ -28,9 +28,9 @@ impl Method {
         METHODS.iter().map(Self::of).collect()
     }
 
-    /// The method of that name, or of a former one, in its default configuration.
+    /// The method of that name in its default configuration.
     pub fn named(name: &str) -> Option<Self> {
-        let is = |descriptor: &&Descriptor| descriptor.name == name || descriptor.former_names.contains(&name);
+        let is = |descriptor: &&Descriptor| descriptor.name == name;
         METHODS.iter().find(is).map(Self::of)
     }
 }

@@ -15,8 +15,6 @@ use trepan_geometry::Tool;
 pub struct Descriptor {
     /// Name on command lines, in charts and recordings.
     pub name: &'static str,
-    /// Names that earlier versions gave it, which stay readable.
-    pub former_names: &'static [&'static str],
     /// Paper or chapter that it follows.
     pub source: &'static str,
     /// Which part of the tool it feels.
@@ -43,7 +41,7 @@ impl Descriptor {
         build: fn(&Tool, usize) -> Box<dyn RigidContact>,
     ) -> Self {
         let (extent, removal) = (Extent::Ball, RemovalLaw::RATE);
-        Self { name, former_names: &[], source, extent, has_proxy: false, is_oracle: false, points: 0, removal, build }
+        Self { name, source, extent, has_proxy: false, is_oracle: false, points: 0, removal, build }
     }
 }
 

@@ -53,8 +53,6 @@ fn names_are_unique_and_found_again() {
         assert_eq!(Method::named(method.name()), Some(method));
     }
     assert_eq!(Method::named("no such method"), None);
-    let renamed = Method::named("distance-field"); // version 0.1
-    assert_eq!(renamed, Method::named("god-object-sphere"));
     assert!(Method::all().contains(&Method::RECOMMENDED));
 }
 

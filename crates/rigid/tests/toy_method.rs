@@ -15,7 +15,6 @@ struct Toy {
 
 static TOY: Descriptor = Descriptor {
     name: "toy",
-    former_names: &[],
     source: "none",
     extent: Extent::Ball,
     has_proxy: false,

@@ -10,8 +10,8 @@
 //! forces bit by bit.
 
 use crate::case::identity::Identity;
+use crate::config::SessionConfig;
 use crate::error::SessionError;
-use crate::hand::{DeviceLimits, FIRST};
 use crate::report::chart::{Chart, Curve, over_time};
 use crate::report::page::{Event, render};
 use crate::stages::score::ScoreKeeper;
@@ -73,7 +73,8 @@ fn remarks(sessions: &[Recording; 2]) -> Vec<String> {
 
 /// Computes the scores from a session's ticks.
 fn score_keeper(session: &Recording) -> ScoreKeeper {
-    let mut scores = ScoreKeeper::at(DeviceLimits::recorded(Some(session), FIRST).force_scale());
+    let force_scale = SessionConfig::of(&session.header).unwrap_or_default().device.force_scale();
+    let mut scores = ScoreKeeper::at(force_scale);
     session.ticks.iter().for_each(|tick| scores.add(tick));
     scores
 }

@@ -8,13 +8,13 @@ use crate::options::Options;
 use crate::program::Program;
 use crate::run::stop::Stop;
 use crate::run::watch::{Watched, Watching};
+use serde::{Deserialize, Serialize};
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, ScriptError, Site};
 use trepan_haptics::{
     Capabilities, Clutch, DeviceName, HapticDevice, Motion, Opened, Setting, ThreadedDevice, Watch, Workspace, mouse,
 };
-use trepan_link::Recording;
 use trepan_rigid::removal::RemovalLaw;
 
 /// An open device of a hand.
@@ -153,95 +153,90 @@ pub(crate) fn device_name(program: Program, options: &Options, windowed: bool) -
 }
 
 /// Device properties that the force guard and the walls depend on; recorded, so that a replay gives
-/// the same forces.
+/// the same forces. Zeros are unknown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct DeviceLimits {
-    /// Capabilities, with the encoder step multiplied by the motion scale.
-    device: Capabilities,
+    /// Largest short-term force, N.
+    pub peak_force_n: f32,
+    /// Largest continuous force, N.
+    pub continuous_force_n: f32,
+    /// Delay from a force's command to the motors, ticks.
+    pub delay_ticks: u8,
+    /// Resolution of the encoders times the motion scale, mm.
+    pub position_step_mm: f32,
+    /// Driven axes: 0, 3 or 6.
+    pub axes_driven: u8,
+    /// Moving mass at the tip, g.
+    pub moving_mass_g: f32,
+    /// The device's viscous damping, N ms/mm.
+    pub damping_n_ms_per_mm: f32,
     /// Motion scale, world mm per device mm.
-    scale: f32,
-    /// Force scale on bone; `None` for a recording of a version without it.
-    force_scale: Option<ForceScale>,
+    pub scale: f32,
+    /// Newtons at the hand per newton of the task, on bone.
+    pub force_scale: f32,
 }
 
-/// Prefix of the first hand's header entries.
-pub(crate) const FIRST: &str = "device_";
-/// Prefix of the second hand's header entries.
-pub(crate) const SECOND: &str = "second_device_";
-
-const PEAK: &str = "peak_force_n";
-const CONTINUOUS: &str = "continuous_force_n";
-const DELAY: &str = "delay_ticks";
-const STEP: &str = "position_step_mm";
-const AXES: &str = "axes_driven";
-const MASS: &str = "moving_mass_g";
-const DAMPING: &str = "damping_n_ms_per_mm";
-const SCALE: &str = "scale";
-const FORCE_SCALE: &str = "force_scale";
+impl Default for DeviceLimits {
+    fn default() -> Self {
+        Self {
+            peak_force_n: 0.0,
+            continuous_force_n: 0.0,
+            delay_ticks: 0,
+            position_step_mm: 0.0,
+            axes_driven: 0,
+            moving_mass_g: 0.0,
+            damping_n_ms_per_mm: 0.0,
+            scale: 1.0,
+            force_scale: 1.0,
+        }
+    }
+}
 
 impl DeviceLimits {
     /// Properties of an open device whose motion is multiplied by `scale`. The force scale is that
     /// of its greatest force unless one is given.
     pub fn of(device: &Capabilities, scale: f32, force_scale: Option<f32>) -> Self {
-        let position_resolution_mm = scale * device.position_resolution_mm;
-        let greatest_n = device.guard_config().max_force_n;
-        let force_scale = Some(force_scale.map_or_else(|| ForceScale::of(greatest_n), ForceScale));
-        Self { device: Capabilities { position_resolution_mm, ..device.clone() }, scale, force_scale }
+        Self {
+            peak_force_n: device.peak_force_n,
+            continuous_force_n: device.continuous_force_n,
+            delay_ticks: device.delay_ticks,
+            position_step_mm: scale * device.position_resolution_mm,
+            axes_driven: device.axes_driven,
+            moving_mass_g: device.moving_mass_g,
+            damping_n_ms_per_mm: device.damping,
+            scale,
+            force_scale: force_scale.unwrap_or_else(|| ForceScale::of(device.guard_config().max_force_n).0),
+        }
     }
 
-    /// Reads the properties of a hand's device ([`FIRST`], [`SECOND`]) from a recording; zeros
-    /// without a recording.
-    pub fn recorded(recording: Option<&Recording>, hand: &str) -> Self {
-        let config = recording.map(|recording| &recording.header.config);
-        let number = |name: &str| config.and_then(|c| c.get(&format!("{hand}{name}"))?.parse().ok()).unwrap_or(0.0f32);
-        let device = Capabilities {
-            peak_force_n: number(PEAK),
-            continuous_force_n: number(CONTINUOUS),
-            delay_ticks: number(DELAY) as u8,
-            position_resolution_mm: number(STEP),
-            axes_driven: number(AXES) as u8,
-            moving_mass_g: number(MASS),
-            damping: number(DAMPING),
+    /// The device, with the encoder step multiplied by the motion scale.
+    fn device(&self) -> Capabilities {
+        Capabilities {
+            peak_force_n: self.peak_force_n,
+            continuous_force_n: self.continuous_force_n,
+            delay_ticks: self.delay_ticks,
+            position_resolution_mm: self.position_step_mm,
+            axes_driven: self.axes_driven,
+            moving_mass_g: self.moving_mass_g,
+            damping: self.damping_n_ms_per_mm,
             ..Capabilities::PASSIVE
-        };
-        let positive = |name: &str| Some(number(name)).filter(|&scale| scale > 0.0);
-        Self { device, scale: positive(SCALE).unwrap_or(1.0), force_scale: positive(FORCE_SCALE).map(ForceScale) }
-    }
-
-    /// Header entries that [`DeviceLimits::recorded`] reads.
-    pub fn entries(&self, hand: &str) -> Vec<(String, String)> {
-        let device = &self.device;
-        [
-            (PEAK, device.peak_force_n),
-            (CONTINUOUS, device.continuous_force_n),
-            (DELAY, device.delay_ticks.into()),
-            (STEP, device.position_resolution_mm),
-            (AXES, device.axes_driven.into()),
-            (MASS, device.moving_mass_g),
-            (DAMPING, device.damping),
-            (SCALE, self.scale),
-        ]
-        .into_iter()
-        .chain(self.force_scale.map(|ForceScale(scale)| (FORCE_SCALE, scale)))
-        .map(|(name, value)| (format!("{hand}{name}"), value.to_string()))
-        .collect()
+        }
     }
 
     /// Newtons at the hand per newton of the task, on bone.
     pub fn force_scale(&self) -> ForceScale {
-        self.force_scale.unwrap_or(ForceScale(1.0))
+        ForceScale(self.force_scale)
     }
 
     /// Law of removal where bone has a stiffness, N/mm, at the hand.
     pub fn removal(&self, hand_stiffness: f32) -> RemovalLaw {
-        match self.force_scale {
-            Some(ForceScale(scale)) => RemovalLaw::RATE.with_hand(hand_stiffness, scale),
-            None => RemovalLaw::CONSTANT_ENERGY,
-        }
+        RemovalLaw::RATE.with_hand(hand_stiffness, self.force_scale)
     }
 
     /// Configuration of the force guard.
     pub fn guard(&self) -> GuardConfig {
-        self.device.guard_config()
+        self.device().guard_config()
     }
 
     /// Divides a wall's stiffness and damping by a scale over 1, and limits them to what the device
@@ -249,6 +244,6 @@ impl DeviceLimits {
     pub fn coupled(&self, wall: Viscoelastic, tick_ms: f32) -> Viscoelastic {
         let scale = self.scale.max(1.0);
         let wall = Viscoelastic { stiffness: wall.stiffness / scale, damping: wall.damping / scale };
-        self.device.coupled(wall, tick_ms)
+        self.device().coupled(wall, tick_ms)
     }
 }

@@ -26,6 +26,7 @@ mod batch;
 mod case;
 mod command;
 mod compare;
+mod config;
 mod constants;
 mod desk;
 mod device_test;

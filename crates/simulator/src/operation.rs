@@ -3,8 +3,8 @@
 
 use crate::options::{CSF_SPEED_UPS, MODULI_KPA, Options, RATES_HZ};
 use crate::tissue_class::TissueClass;
+use serde::{Deserialize, Serialize};
 use trepan_haptics::DeviceName;
-use trepan_link::Recording;
 use trepan_measurements::{brain_living, support};
 
 /// Default diameter of the flap that script `flap` cuts, mm.
@@ -17,7 +17,8 @@ const YOUNG_KPA: f32 = brain_living::YOUNG_MODULUS.f32();
 const RATE_HZ: f32 = 1000.0;
 
 /// Settings of an operation.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct Operation {
     /// Diameter of the planned flap, mm; 0 for a burr hole alone.
     pub flap_mm: f32,
@@ -31,80 +32,64 @@ pub(crate) struct Operation {
     /// Tissue classes that raise a warning when a tool comes close.
     pub forbidden: Vec<TissueClass>,
     /// Young's modulus of the brain, kPa.
-    pub young_kpa: f32,
+    pub young_modulus_kpa: f32,
     /// Haptic tick rate, Hz.
     pub rate_hz: f32,
     /// Whether the brain's tools require an open skull; false for a watcher.
     pub opening_needed: bool,
-    /// Whether force stays off after a device fault until the user acts. False for a watcher, and
-    /// for recordings of versions without this rule.
+    /// Whether force stays off after a device fault until the user acts; false for a watcher.
     pub force_waits: bool,
+}
+
+impl Default for Operation {
+    fn default() -> Self {
+        Self {
+            flap_mm: 0.0,
+            flap_line: Vec::new(),
+            csf_loss: None,
+            csf_speed_up: CSF_SPEED_UP,
+            forbidden: vec![TissueClass::Vessel],
+            young_modulus_kpa: YOUNG_KPA,
+            rate_hz: RATE_HZ,
+            opening_needed: true,
+            force_waits: true,
+        }
+    }
 }
 
 impl Operation {
     /// Takes settings from the options, and missing ones from the replayed recording, if any.
-    pub fn of(options: &Options, device: &DeviceName, recording: Option<&Recording>) -> Self {
-        let recorded = |key: &str| recording?.header.config.get(key);
-        let number = |key: &str| recorded(key)?.parse::<f32>().ok().filter(|value| value.is_finite());
-        let within = |key: &str, [low, high]: [f64; 2]| number(key).filter(|&n| (low..=high).contains(&n.into()));
-        let scripted = device.operation() == Some("flap");
-        let flap = options.flap.or_else(|| number("flap_mm")).or(scripted.then_some(SCRIPTED_FLAP_MM));
-        let listed = || {
-            let names = recorded("forbidden")?;
-            Some(names.split(',').filter_map(TissueClass::named).collect())
-        };
+    pub fn of(options: &Options, device: &DeviceName, recorded: Option<&Self>) -> Self {
+        let flap_mm = if device.operation() == Some("flap") { SCRIPTED_FLAP_MM } else { 0.0 };
+        let base = recorded.cloned().unwrap_or_else(|| Self { flap_mm, ..Self::default() });
+        let keeps_line = options.flap_line.is_empty() && options.flap.is_none();
+        // A watcher does not see the bone that was drilled before it joined.
+        let watches = options.watch.is_some();
         Self {
-            flap_mm: flap.unwrap_or(0.0),
-            flap_line: match (&options.flap_line[..], options.flap) {
-                ([], None) => recorded("flap_line").map_or_else(Vec::new, |text| points(text)),
-                (line, _) => line.to_vec(),
-            },
-            csf_loss: options.csf_loss.or_else(|| number("csf_loss")).or_else(|| number("fluid_lost")),
-            csf_speed_up: options
-                .csf_speed_up
-                .or_else(|| within("csf_speed_up", CSF_SPEED_UPS))
-                .unwrap_or(CSF_SPEED_UP),
-            forbidden: options.forbid.clone().or_else(listed).unwrap_or_else(|| vec![TissueClass::Vessel]),
-            young_kpa: options
-                .young_modulus_kpa
-                .or_else(|| within("young_modulus_kpa", MODULI_KPA))
-                .unwrap_or(YOUNG_KPA),
-            rate_hz: options.rate_hz.or_else(|| within("rate_hz", RATES_HZ)).unwrap_or(RATE_HZ),
-            // A watcher does not see the bone that was drilled before it joined.
-            opening_needed: options.watch.is_none()
-                && recorded("opening_needed").is_none_or(|needed| needed != "false"),
-            force_waits: options.watch.is_none()
-                && recording.is_none_or(|_| recorded("force_waits").is_some_and(|waits| waits == "true")),
+            flap_mm: options.flap.unwrap_or(base.flap_mm),
+            flap_line: if keeps_line { base.flap_line } else { options.flap_line.clone() },
+            csf_loss: options.csf_loss.or(base.csf_loss),
+            csf_speed_up: options.csf_speed_up.unwrap_or(base.csf_speed_up),
+            forbidden: options.forbid.clone().unwrap_or(base.forbidden),
+            young_modulus_kpa: options.young_modulus_kpa.unwrap_or(base.young_modulus_kpa),
+            rate_hz: options.rate_hz.unwrap_or(base.rate_hz),
+            opening_needed: base.opening_needed && !watches,
+            force_waits: base.force_waits && !watches,
         }
     }
 
-    /// Entries for a recording's header.
-    pub fn entries(&self) -> [(String, String); 9] {
-        let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
-        [
-            ("flap_mm".into(), self.flap_mm.to_string()),
-            (
-                "flap_line".into(),
-                self.flap_line.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect::<Vec<_>>().join(","),
-            ),
-            ("csf_loss".into(), self.csf_loss.map_or_else(String::new, |share| share.to_string())),
-            ("csf_speed_up".into(), self.csf_speed_up.to_string()),
-            ("forbidden".into(), forbidden.join(",")),
-            ("young_modulus_kpa".into(), self.young_kpa.to_string()),
-            ("rate_hz".into(), self.rate_hz.to_string()),
-            ("opening_needed".into(), self.opening_needed.to_string()),
-            ("force_waits".into(), self.force_waits.to_string()),
-        ]
+    /// Refuses a recorded number that no flag allows.
+    pub fn check(&self) -> Result<(), String> {
+        let ranges = [
+            ("csf_speed_up", self.csf_speed_up, CSF_SPEED_UPS),
+            ("young_modulus_kpa", self.young_modulus_kpa, MODULI_KPA),
+            ("rate_hz", self.rate_hz, RATES_HZ),
+        ];
+        match ranges.into_iter().find(|(_, value, [low, high])| !(*low..=*high).contains(&f64::from(*value))) {
+            None => Ok(()),
+            Some((name, value, [low, high])) => Err(format!("operation.{name} is {value}, out of {low} to {high}")),
+        }
     }
-}
-
-/// Reads the points of a recorded line; none if one of them is no point.
-fn points(text: &str) -> Vec<[f32; 3]> {
-    let point = |text: &str| {
-        let numbers: Vec<f32> = text.split(' ').map_while(|number| number.parse().ok()).collect();
-        <[f32; 3]>::try_from(numbers).ok()
-    };
-    text.split(',').map(point).collect::<Option<_>>().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -122,23 +107,10 @@ mod tests {
         let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --rate-hz 500 --watch other";
         let drawn = Options { flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]], ..parse(line) };
         let given = Operation::of(&drawn, &script, None);
-        assert!(!given.opening_needed && usual.opening_needed);
-        let mut recording = Recording::default();
-        assert!(usual.force_waits && !Operation::of(&parse("x"), &script, Some(&recording)).force_waits);
-        recording.header.config.extend(given.entries());
-        assert_eq!(Operation::of(&parse("x"), &DeviceName::MOUSE, Some(&recording)), given);
-        let round = Operation::of(&parse("x --flap 40"), &script, Some(&recording));
+        assert!(!given.opening_needed && usual.opening_needed && usual.force_waits);
+        assert_eq!(Operation::of(&parse("x"), &DeviceName::MOUSE, Some(&given)), given);
+        let round = Operation::of(&parse("x --flap 40"), &script, Some(&given));
         assert!(round.flap_mm == 40.0 && round.flap_line.is_empty());
-        let older = |line: &str| Operation::of(&parse(line), &script, Some(&recording)).csf_loss;
-        assert_eq!((older("x"), older("x --fluid-lost 0.2")), (Some(0.0), Some(0.2)), "the flag of version 0.1");
-        let lost = recording.header.config.remove("csf_loss").unwrap();
-        recording.header.config.insert("fluid_lost".into(), lost);
-        assert_eq!(Operation::of(&parse("x"), &script, Some(&recording)).csf_loss, Some(0.0), "the key of version 0.1");
-        recording.header.config.insert("rate_hz".into(), "0".into());
-        assert_eq!(
-            Operation::of(&parse("x"), &script, Some(&recording)).rate_hz,
-            RATE_HZ,
-            "a rate out of range is ignored"
-        );
+        assert_eq!(Operation::of(&parse("x"), &script, Some(&given)).csf_loss, Some(0.0));
     }
 }

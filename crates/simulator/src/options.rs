@@ -143,13 +143,7 @@ pub struct Options {
     pub flap_line: Vec<[f32; 3]>,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1. The brain sinks
     /// [default: 0.3, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
-    #[arg(
-        help_heading = "Models and accuracy",
-        long,
-        alias = "fluid-lost",
-        value_name = "SHARE",
-        allow_negative_numbers = true
-    )]
+    #[arg(help_heading = "Models and accuracy", long, value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,
     /// How much faster than in a patient the fluid drains, 1 to 1000 [default: 60, a minute for an
     /// hour; a replay's as recorded]
@@ -212,7 +206,7 @@ pub struct Patient {
     pub tets: Option<usize>,
     /// Halvings of the edge length within 7 mm of the opening, 4 mm deep, at the same count
     /// [default: by --quality; 4 for `case build`]
-    #[arg(long, alias = "finer", value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=4))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=4))]
     pub opening_refinement: Option<u32>,
     /// Register the MRI (and labels) to the CT by mutual information
     #[arg(long)]

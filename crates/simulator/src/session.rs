@@ -5,6 +5,7 @@ use crate::case::identity::Identity;
 use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
+use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::hand::{self, DeviceLimits, OpenDevice};
 use crate::models::{ModelRequest, Models};
@@ -58,6 +59,8 @@ pub struct Session {
     recording: Option<Arc<Recording>>,
     /// Of a watched session: its header.
     watched: Option<Recording>,
+    /// Configuration of the recording or of the watched session; default without one.
+    recorded: SessionConfig,
     case: Identity,
     setup: SessionSetup,
     /// Input files of the case; empty for a case folder.
@@ -124,8 +127,9 @@ impl Session {
             None => None,
         };
         let settled = recording.as_deref().or(watched.as_ref());
-        let operation = Operation::of(&options, &device, settled);
-        let request = ModelRequest::of(program, &options, &operation, settled)?;
+        let recorded = settled.map(|settled| SessionConfig::of(&settled.header)).transpose()?;
+        let operation = Operation::of(&options, &device, recorded.as_ref().map(|config| &config.operation));
+        let request = ModelRequest::of(program, &options, &operation, recorded.as_ref())?;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
             None => choice::inputs(&options.patient, built_in.clone()),
@@ -147,6 +151,7 @@ impl Session {
             second,
             recording,
             watched,
+            recorded: recorded.unwrap_or_default(),
             case: identity,
             setup,
             inputs,
@@ -172,7 +177,7 @@ impl Session {
             return self.run().map(|_| ());
         };
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let limits = DeviceLimits::recorded(Some(&recording), hand::FIRST);
+        let limits = &self.recorded.device;
         let mut first = View::at(self.start(), limits.guard().max_force_n);
         first.force_scale = limits.force_scale();
         self.place.progress.next("preparing the picture")?;
@@ -198,8 +203,9 @@ impl Session {
             Some(name) => Some(OpenDevice::second(name, options, plan, rate_hz)?),
             None => self.recording.as_ref().filter(|r| !r.second.is_empty()).map(|_| OpenDevice::default()),
         };
-        let limits = self.limits(&hand, hand::FIRST);
-        let second_limits = second.as_ref().map(|second| self.limits(second, hand::SECOND));
+        let limits = self.limits(&hand, &self.recorded.device);
+        let of_second = self.recorded.second_device.clone().unwrap_or_default();
+        let second_limits = second.as_ref().map(|second| self.limits(second, &of_second));
         let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
         // Before the last preparations: a watcher loads beside them.
         let (share, asked) = self.options.share.as_deref().map(|name| Share::open(name, &header)).transpose()?.unzip();
@@ -403,16 +409,13 @@ impl Session {
         Filming::new(self.setup.bone().cloned().zip(whole), rest, length_ms)
     }
 
-    /// Limits of a hand's device; the recorded ones, if none is open.
-    fn limits(&self, hand: &OpenDevice, name: &str) -> DeviceLimits {
+    /// Limits of a hand's device; the recorded ones, if none is open. A watcher's bone gives way as
+    /// the trainee's does.
+    fn limits(&self, hand: &OpenDevice, recorded: &DeviceLimits) -> DeviceLimits {
         let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
-        let recorded = || DeviceLimits::recorded(self.recording.as_deref(), name);
         let of = |device: &dyn HapticDevice| DeviceLimits::of(&device.capabilities(), scale, self.options.force_scale);
-        match &self.watched {
-            // The watcher's bone gives way as the trainee's does.
-            Some(watched) => DeviceLimits::recorded(Some(watched), name),
-            None => hand.device.as_deref().map_or_else(recorded, of),
-        }
+        let device = hand.device.as_deref().filter(|_| self.watched.is_none());
+        device.map_or_else(|| recorded.clone(), of)
     }
 
     /// Tool before the first reading of its device. A replay starts here too, because the first
@@ -509,20 +512,20 @@ impl Session {
     }
 
     fn header(&self, limits: &DeviceLimits, second: Option<&DeviceLimits>) -> SessionHeader {
-        let hands = limits.entries(hand::FIRST).into_iter();
-        let hands = hands.chain(second.into_iter().flat_map(|second| second.entries(hand::SECOND)));
+        let config = SessionConfig {
+            solver_run: self.setup.solver_name().into(),
+            operation: self.setup.operation.clone(),
+            device: limits.clone(),
+            second_device: second.cloned(),
+            ..self.setup.models.config(self.setup.ingredients())
+        };
         SessionHeader {
             app: self.program.name().into(),
             version: env!("CARGO_PKG_VERSION").into(),
             case: self.case.name.clone(),
             seed: self.options.seed,
             hashes: self.case.hashes(),
-            config: [("solver_run".to_string(), self.setup.solver_name().into())]
-                .into_iter()
-                .chain(self.setup.models.entries(&self.setup.ingredients()))
-                .chain(self.setup.operation.entries())
-                .chain(hands)
-                .collect(),
+            config: config.entries(),
         }
     }
 

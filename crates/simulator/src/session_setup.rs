@@ -66,7 +66,7 @@ impl SessionSetup {
         let mut setup = Self {
             program,
             plan: planned(&scene, &operation)?,
-            young_mpa: units::mpa_from_kpa(operation.young_kpa),
+            young_mpa: units::mpa_from_kpa(operation.young_modulus_kpa),
             scene,
             operation,
             models,

@@ -8,6 +8,7 @@
 use crate::error::SessionError;
 use crate::remark::WELL;
 use glam::DAffine3;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use trepan_soft::Material;
@@ -277,6 +278,18 @@ impl TissueSource {
             share if share >= STRANGE_SHARE => lies,
             _ => lies + ": are these the labels of this patient?",
         })
+    }
+}
+
+impl Serialize for TissueClass {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for TissueClass {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        String::deserialize(from)?.parse().map_err(de::Error::custom)
     }
 }
 

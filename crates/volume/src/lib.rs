@@ -57,7 +57,6 @@ mod note;
 pub mod nrrd;
 mod overlap;
 mod padding;
-mod pictures;
 mod registration;
 mod regular;
 mod resample;
@@ -81,10 +80,9 @@ pub use list::{FORMATS, import, import_among, import_number, read, write_beside}
 pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};
-pub use pictures::{Picture, overlap_pictures};
 pub use registration::{Registration, RegistrationConfig, RegistrationError, register};
 pub use regular::{open_regular, read_regular};
-pub use resample::{Grid, Interpolation, resample};
+pub use resample::{Grid, Interpolation, corners, resample};
 pub use sample::{ByteOrder, Number, Sample};
 pub use segmentation::{Segment, Segmentation, flatness};
 pub use skull::{

@@ -218,7 +218,7 @@ impl<'a, T: Sample> Source<'a, T> {
 
 /// The 8 voxels around a point in continuous indices, with their weights; points are clamped to the
 /// voxel centres.
-pub(crate) fn corners(dims: [usize; 3], last: Vec3, point: Vec3) -> [(usize, f32); 8] {
+pub fn corners(dims: [usize; 3], last: Vec3, point: Vec3) -> [(usize, f32); 8] {
     let p = point.clamp(Vec3::ZERO, last);
     let b = p.min((last - 1.0).max(Vec3::ZERO)).as_uvec3();
     let f = p - b.as_vec3();

@@ -2,11 +2,12 @@
 //! below.
 
 use trepan_render::Image;
-use trepan_volume::{Picture, VoxelVolume, overlap_pictures};
+use trepan_render::{RgbPicture, overlap_pictures};
+use trepan_volume::VoxelVolume;
 
 /// Overlay pictures: a row of three planes for each pose of the MRI.
 pub(crate) struct Fit {
-    rows: Vec<[Picture; 3]>,
+    rows: Vec<[RgbPicture; 3]>,
 }
 
 impl Fit {

@@ -9,7 +9,7 @@ use trepan_rigid::{Extent, god_object_sphere};
 
 /// One ingredient of the models.
 pub struct Key {
-    /// Name in `--set`; in a recording's header with `_` for `-`.
+    /// Name in `--set`, and in a recording's header.
     pub name: &'static str,
     /// Known values, in words.
     pub values: fn() -> String,
@@ -354,11 +354,6 @@ impl Key {
         KEYS.iter().find(|key| key.name == name)
     }
 
-    /// Name of its entry in a recording's header.
-    pub fn header_name(&self) -> String {
-        self.name.replace('-', "_")
-    }
-
     /// Its value; `by --quality` where that chooses.
     pub fn value(&self, of: &Ingredients) -> String {
         (self.get)(of).unwrap_or_else(|| BY_QUALITY.into())
@@ -367,6 +362,11 @@ impl Key {
     /// Changes the ingredient; refuses an unknown value.
     pub fn set(&self, to: &mut Ingredients, text: &str) -> Result<(), String> {
         (self.set)(to, text).ok_or_else(|| format!("{text} is not known; known are {}", (self.values)()))
+    }
+
+    /// Whether a text says that nothing was chosen by hand.
+    pub fn is_unset(&self, text: &str) -> bool {
+        self.usual.is_none() && text == BY_QUALITY
     }
 
     /// Value of a quality, where it does not depend on machine and case.

@@ -18,7 +18,8 @@ pub use variants::{Variant, of_quality, realistic, variants};
 
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 use trepan_measurements::fits;
 
 /// What the models of a session are made of; `None` where `--quality` chooses.
@@ -155,5 +156,25 @@ impl Ingredients {
 impl Serialize for Ingredients {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         to.collect_map(KEYS.iter().map(|key| (key.name, key.value(self))))
+    }
+}
+
+/// The ingredients of a session that ran: a value that is no longer known is replaced by the
+/// default, with a warning. Which device was the fastest is not known: the processor always runs.
+impl<'de> Deserialize<'de> for Ingredients {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let texts = BTreeMap::<String, String>::deserialize(from)?;
+        let mut made = Self::default();
+        for (key, text) in KEYS.iter().filter_map(|key| Some((key, texts.get(key.name)?))) {
+            if let Err(fault) =
+                key.set(&mut made, text).or_else(|fault| if key.is_unset(text) { Ok(()) } else { Err(fault) })
+            {
+                tracing::warn!("the recording's {}: {fault}; its forces may differ", key.name);
+            }
+        }
+        if made.device == SolverDevice::Fastest {
+            made.device = SolverDevice::Cpu;
+        }
+        Ok(made)
     }
 }

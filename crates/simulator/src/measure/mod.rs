@@ -7,11 +7,13 @@ mod machine;
 pub mod picture;
 pub mod tissue;
 
+use serde::{Deserialize, Serialize};
+
 pub use case_errors::{CaseErrors, Sight};
 pub use machine::machine;
 
 /// One value for each part that a plan chooses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parts<T> {
     /// Haptic ticks on bone.
     pub bone: T,

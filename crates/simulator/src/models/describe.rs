@@ -1,6 +1,7 @@
 //! Describes the models: in the log, in a recording's header, in `summary.json`, on a terminal.
 
 use super::Models;
+use crate::config::{SessionConfig, Sizes};
 use crate::ingredients::{Ingredients, KEYS};
 use crate::measure::Parts;
 use crate::uncertainty;
@@ -149,24 +150,23 @@ impl Models {
         }
     }
 
-    /// Entries for a recording's header; a replay reads the parameters among them. `ran`: the
-    /// ingredients that ran.
-    pub fn entries(&self, ran: &Ingredients) -> impl Iterator<Item = (String, String)> {
+    /// What the models add to a session's configuration. `ran`: the ingredients that ran.
+    pub(crate) fn config(&self, ran: Ingredients) -> SessionConfig {
         let Setup { bone, tissue, picture } = &self.setup;
-        let why = self.why.clone();
-        let others = [
-            ("spacing_mm", bone.spacing_mm.to_string()),
-            ("tets", tissue.tets.to_string()),
-            ("halvings", tissue.halvings.to_string()),
-            ("picture_sparse", picture.sparse.to_string()),
-            ("picture_detail", picture.detail.to_string()),
-            ("quality", self.by.to_string()),
-            ("bone_why", why.bone),
-            ("tissue_why", why.tissue),
-            ("picture_why", why.picture),
-        ];
-        let ingredients: Vec<_> = KEYS.iter().map(|key| (key.header_name(), key.value(ran))).collect();
-        others.map(|(key, value)| (key.to_string(), value)).into_iter().chain(ingredients)
+        let sizes = Sizes {
+            spacing_mm: Some(bone.spacing_mm),
+            tets: Some(tissue.tets),
+            halvings: Some(tissue.halvings),
+            picture_detail: Some(picture.detail),
+            picture_sparse: picture.sparse,
+        };
+        SessionConfig {
+            quality: self.by.into(),
+            why: self.why.clone(),
+            sizes,
+            ingredients: ran,
+            ..SessionConfig::default()
+        }
     }
 
     /// Entry for `summary.json`. `ran`: the ingredients that ran.

@@ -21,6 +21,7 @@ mod overrides;
 
 pub use describe::{ModelSummary, TissueSummary};
 
+use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::ingredients::{Element, Ingredients};
 use crate::measure::{self, CaseErrors, Parts, Wanted};
@@ -35,7 +36,6 @@ use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
-use trepan_link::Recording;
 use trepan_soft::Material;
 
 /// The models of a session, with the reasons for them.
@@ -88,13 +88,13 @@ impl ModelRequest {
         program: Program,
         options: &Options,
         operation: &Operation,
-        recording: Option<&Recording>,
+        recorded: Option<&SessionConfig>,
     ) -> Result<Self, SessionError> {
         let preset = options.quality.filter(|&quality| quality != Quality::Auto);
-        let recording = recording.filter(|_| preset.is_none());
-        let quality = if recording.is_some() { None } else { Some(preset.unwrap_or_default()) };
-        let given = match recording {
-            Some(recording) => Overrides::recorded(&recording.header.config),
+        let recorded = recorded.filter(|_| preset.is_none());
+        let quality = if recorded.is_some() { None } else { Some(preset.unwrap_or_default()) };
+        let given = match recorded {
+            Some(config) => Overrides::recorded(config),
             None => Overrides::of(Ingredients::of(quality.unwrap_or_default())),
         };
         let pictures = !options.headless || options.frames_per_second > 0.0;
@@ -103,7 +103,7 @@ impl ModelRequest {
             quality,
             given: given.with_flags(&options.patient, &options.given()?)?,
             tolerances: options.tolerances,
-            young_mpa: units::mpa_from_kpa(operation.young_kpa),
+            young_mpa: units::mpa_from_kpa(operation.young_modulus_kpa),
             rate_hz: operation.rate_hz,
             picture: pictures.then_some(options.picture),
             pictures_per_s: if options.headless && pictures { options.frames_per_second } else { LIVE_HZ },
@@ -368,10 +368,10 @@ mod tests {
         Ok(CaseErrors::default())
     }
 
-    fn request(line: &str, recording: Option<&Recording>) -> ModelRequest {
+    fn request(line: &str, recorded: Option<&SessionConfig>) -> ModelRequest {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
-        let operation = Operation::of(&options, &trepan_haptics::DeviceName::MOUSE, recording);
-        ModelRequest::of(Program::Integrated, &options, &operation, recording).unwrap()
+        let operation = Operation::of(&options, &trepan_haptics::DeviceName::MOUSE, None);
+        ModelRequest::of(Program::Integrated, &options, &operation, recorded).unwrap()
     }
 
     const FACTS: Facts = Facts { ct_voxel_mm: Some(1.0), brain_mm3: Some(1.2e6) };
@@ -432,30 +432,26 @@ mod tests {
 
     #[test]
     fn a_replay_takes_what_was_recorded_and_measures_nothing() {
-        let mut recording = Recording::default();
-        let recorded = request("--quality fine --spacing-mm 0.85 --rigid thesis", None)
+        let was = request("--quality fine --spacing-mm 0.85 --rigid thesis", None)
             .settle(&FACTS, || false, unmeasured)
             .unwrap();
-        recording.header.config.extend(recorded.entries(&recorded.ingredients()));
+        let recorded = was.config(was.ingredients());
         for line in ["", "--quality auto"] {
-            let again = request(line, Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
-            assert_eq!((again.setup, again.by, again.plan.is_none()), (recorded.setup, "replay", true));
+            let again = request(line, Some(&recorded)).settle(&FACTS, || false, unmeasured).unwrap();
+            assert_eq!((again.setup, again.by, again.plan.is_none()), (was.setup, "replay", true));
         }
         let other =
-            request("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
+            request("--tets 7000 --spacing-mm 2", Some(&recorded)).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!((other.setup.tissue.tets, other.setup.bone.spacing_mm), (7000, 2.0));
         assert_eq!(other.setup.bone.method, "thesis");
-        let draft = request("--quality draft", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
+        let draft = request("--quality draft", Some(&recorded)).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!(Some(draft.setup), Quality::Draft.preset());
-        recording.header.config = [("spacing_mm".to_string(), "1".to_string())].into();
-        let older = request("", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
-        assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran the defaults");
     }
 
     #[test]
     fn ingredients_are_given_recorded_and_overridden() {
-        let settle = |line: &str, recording: Option<&Recording>| {
-            request(line, recording).settle(&FACTS, || false, unmeasured).unwrap()
+        let settle = |line: &str, recorded: Option<&SessionConfig>| {
+            request(line, recorded).settle(&FACTS, || false, unmeasured).unwrap()
         };
         let plain = settle("--quality usual", None).ingredients();
         assert_eq!(
@@ -472,15 +468,12 @@ mod tests {
         assert_eq!((&json["law"], &json["shaft"]), (&"neo-hookean+grey:ogden".into(), &"on".into()));
         assert_eq!(was.setup.bone.method, "god-object-sphere-shaft");
         assert!(was.why.tissue.contains("--set element=locking-free is given; "), "{}", was.why.tissue);
-        let mut recording = Recording::default();
-        recording.header.config.extend(was.entries(&was.ingredients()));
-        assert_eq!(settle("", Some(&recording)).ingredients(), was.ingredients());
-        let other = settle("--set threads=1,shaft=off", Some(&recording)).ingredients();
+        let recorded = was.config(was.ingredients());
+        assert_eq!(settle("", Some(&recorded)).ingredients(), was.ingredients());
+        let other = settle("--set threads=1,shaft=off", Some(&recorded)).ingredients();
         let expected = Ingredients { threads: Some(1), rigid: Some("god-object-sphere"), ..was.ingredients() };
         assert_eq!(other, expected);
-        assert_eq!(settle("--quality usual", Some(&recording)).ingredients(), plain, "a preset overrides a recording");
-        recording.header.config.insert("solver".into(), "fastest".into());
-        assert_eq!(settle("", Some(&recording)).ingredients().device, crate::ingredients::SolverDevice::Cpu);
+        assert_eq!(settle("--quality usual", Some(&recorded)).ingredients(), plain, "a preset overrides a recording");
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! Given parameters of the models: by flags, a recording's header or a case folder.
 
+use crate::config::{SessionConfig, Sizes};
 use crate::error::SessionError;
-use crate::ingredients::{Given, Ingredients, KEYS, Part, SolverDevice};
+use crate::ingredients::{Given, Ingredients, KEYS, Part};
 use crate::measure::Parts;
 use crate::options::Patient;
-use std::collections::BTreeMap;
 use trepan_budget::{Bone, Picture, Tissue};
 
 /// Given parameters of each part, and `words` that describe them.
@@ -24,30 +24,11 @@ impl Overrides {
         Self { spacing_mm: None, tets: None, halvings: None, picture: None, ingredients, words: Parts::default() }
     }
 
-    /// Reads a recording's header ([`Models::entries`](super::Models::entries)). Entries missing in
-    /// older recordings had the default value, except that meshes of a given size were uniform.
-    pub fn recorded(config: &BTreeMap<String, String>) -> Self {
-        let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
-        let count = |key: &str| config.get(key)?.parse::<usize>().ok();
-        let flag = |key: &str| config.get(key).is_some_and(|value| value == "true");
-        let mut ingredients = Ingredients::default();
-        for (key, text) in KEYS.iter().filter_map(|key| Some((key, config.get(&key.header_name())?))) {
-            if let Err(fault) = key.set(&mut ingredients, text) {
-                tracing::warn!("the recording's {}: {fault}; its forces may differ", key.name);
-            }
-        }
-        // Which one was the fastest is not known; the processor is always available.
-        if ingredients.device == SolverDevice::Fastest {
-            ingredients.device = SolverDevice::Cpu;
-        }
-        let detail = number("picture_detail");
-        Self {
-            spacing_mm: number("spacing_mm"),
-            tets: count("tets"),
-            halvings: count("halvings").filter(|n| *n <= 4).or(count("tets").map(|_| 0)).map(|n| n as u32),
-            picture: detail.map(|detail| Picture { sparse: flag("picture_sparse"), detail }),
-            ..Self::of(ingredients)
-        }
+    /// What a recorded session ran.
+    pub fn recorded(config: &SessionConfig) -> Self {
+        let Sizes { spacing_mm, tets, halvings, picture_detail, picture_sparse: sparse } = config.sizes;
+        let picture = picture_detail.map(|detail| Picture { sparse, detail });
+        Self { spacing_mm, tets, halvings, picture, ..Self::of(config.ingredients.clone()) }
     }
 
     /// Adds the flags, which override all others.

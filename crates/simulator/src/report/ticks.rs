@@ -5,9 +5,9 @@
 //! finite is an empty field. With a time between rows, removed bone is summed since the row before,
 //! and a breakthrough between two rows stands in the later one. The second hand is left out.
 
+use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::force_scale::ForceScale;
-use crate::hand::FIRST;
 use crate::printable::{count, printable};
 use crate::program::{Phase, Program};
 use crate::report::csv;
@@ -124,6 +124,8 @@ struct Rows {
     through: bool,
     written: usize,
     text: String,
+    /// Force scale of the recording, once its header is read.
+    scale: Option<ForceScale>,
 }
 
 impl Rows {
@@ -137,6 +139,7 @@ impl Rows {
             through: false,
             written: 0,
             text,
+            scale: None,
         }
     }
 
@@ -150,8 +153,8 @@ impl Rows {
         if let Some(every_ms) = self.every_ms {
             self.next_ms = ((tick.time_ms / every_ms).floor() + 1.0) * every_ms;
         }
-        let scale = header.config.get(&format!("{FIRST}force_scale")).and_then(|scale| scale.parse().ok());
-        let scale = ForceScale(scale.filter(|scale| *scale > 0.0).unwrap_or(1.0));
+        let scale =
+            *self.scale.get_or_insert_with(|| SessionConfig::of(header).unwrap_or_default().device.force_scale());
         let (removed_mm3, removed_in_all_mm3) = (std::mem::take(&mut self.removed_mm3), self.removed_in_all_mm3);
         let sampled =
             Sampled { tick, scale, removed_mm3, removed_in_all_mm3, through: std::mem::take(&mut self.through) };

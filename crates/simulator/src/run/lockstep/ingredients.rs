@@ -3,6 +3,7 @@
 use super::*;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case};
+use crate::config::SessionConfig;
 use crate::force_scale::ForceScale;
 use crate::hand::DeviceLimits;
 use crate::ingredients::{KEYS, SolverDevice};
@@ -58,9 +59,10 @@ fn case() -> Case {
 fn setup(line: &str, recording: Option<&Recording>) -> SessionSetup {
     let options = Options::try_parse_from(format!("x --headless --frames-per-second 0 {line}").split_whitespace());
     let (options, program) = (options.unwrap(), Program::Integrated);
-    let mut operation = Operation::of(&options, &DeviceName::MOUSE, recording);
+    let recorded = recording.map(|recording| SessionConfig::of(&recording.header).unwrap());
+    let mut operation = Operation::of(&options, &DeviceName::MOUSE, recorded.as_ref().map(|config| &config.operation));
     operation.opening_needed = false;
-    let request = ModelRequest::of(program, &options, &operation, recording).unwrap();
+    let request = ModelRequest::of(program, &options, &operation, recorded.as_ref()).unwrap();
     let models = request.settle(&Facts::default(), || false, |_, _, _| Ok(CaseErrors::default())).unwrap();
     SessionSetup::new(program, (case(), models), operation, false).unwrap()
 }
@@ -122,8 +124,8 @@ fn operated_cheaper(line: &str, cheaper_from: u64) -> (Recording, SessionSetup) 
     }
     let faults = tissue.solver.solver_faults();
     assert_eq!((faults.contacts_left_out, faults.restless_steps), (0, 0), "{line}");
-    recording.header.config.extend(setup.models.entries(&setup.ingredients()));
-    recording.header.config.extend(setup.operation.entries());
+    let config = setup.models.config(setup.ingredients());
+    recording.header.config = SessionConfig { operation: setup.operation.clone(), ..config }.entries();
     (recording, setup)
 }
 
@@ -157,7 +159,7 @@ fn all_ingredients_together_are_recorded_and_replay_bit_for_bit() {
     assert_eq!((identical, is.ingredients()), (END - 1, was.ingredients()));
     for (name, text) in ALL.split(',').filter_map(|given| given.split_once('=')) {
         let key = KEYS.iter().find(|key| key.name == name.split('.').next().unwrap()).unwrap();
-        let recorded = &recording.header.config[&key.header_name()];
+        let recorded = &recording.header.config[&format!("ingredients.{}", key.name)];
         let expected = match name {
             "rigid" => "god-object-sphere-shaft",
             "law" | "law.grey" => "ogden+grey:mooney-rivlin+ventricle:neo-hookean",
@@ -211,7 +213,11 @@ fn each_key_that_is_physical_changes_the_force_where_it_acts_and_replays() {
         assert!(bone_alone || found[0] == [0.0; 2], "{given} changes the force on bone: {found:?}");
         let name = given.split(['=', '.']).next().unwrap();
         let key = KEYS.iter().find(|key| key.name == name).unwrap();
-        assert_ne!(key.value(&setup.ingredients()), plain.header.config[&key.header_name()], "{given}");
+        assert_ne!(
+            key.value(&setup.ingredients()),
+            plain.header.config[&format!("ingredients.{}", key.name)],
+            "{given}"
+        );
         assert_eq!(replayed(&with).0, END - 1, "{given}");
     }
 }

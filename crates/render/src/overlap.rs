@@ -6,8 +6,8 @@
 //! patient's right is on the left; the sagittal picture has the face on the left. The bone's
 //! contour is orange. Returns raw RGB bytes; the caller writes the file.
 
-use crate::{VoxelVolume, resample::corners};
 use glam::{DVec3, Vec3};
+use trepan_volume::{VoxelVolume, corners};
 
 /// The contour's colour.
 const BONE: [u8; 3] = [255, 140, 0];
@@ -17,7 +17,7 @@ const LONGEST: f64 = 2048.0;
 
 /// A picture: rows from the top, RGB bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct RgbPicture {
     /// Pixels in a row.
     pub width: usize,
     /// Rows.
@@ -31,7 +31,7 @@ pub struct Picture {
 ///
 /// To compare before and after registration, call it with the MRI's original and transformed
 /// `world_from_voxel`.
-pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue: i16) -> [Picture; 3] {
+pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue: i16) -> [RgbPicture; 3] {
     let (low, high) = ct.world_corners();
     let middle = bone_middle(ct, isovalue).unwrap_or(0.5 * (low + high));
     let (ct, mri) = (Sampler::new(ct), Sampler::new(mri));
@@ -61,7 +61,7 @@ pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue:
             true => BONE,
             false => [mri.at(at(n % width, n / width), |v| v).map_or(0, |v| grey.of(v)); 3],
         };
-        Picture { width, height, rgb: (0..width * height).flat_map(colour).collect() }
+        RgbPicture { width, height, rgb: (0..width * height).flat_map(colour).collect() }
     })
 }
 
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!([coronal.width, coronal.height], [30, 20]);
         assert_eq!([axial.width, axial.height, axial.rgb.len()], [30, 40, 3600]);
         let pixel =
-            |p: &Picture, x: usize, y: usize| <[u8; 3]>::try_from(&p.rgb[3 * (x + y * p.width)..][..3]).unwrap();
+            |p: &RgbPicture, x: usize, y: usize| <[u8; 3]>::try_from(&p.rgb[3 * (x + y * p.width)..][..3]).unwrap();
         // Row 0 is the head's end, voxel 19; x runs from front to back or from right to left.
         assert_eq!(pixel(&sagittal, 39 - 4, 19 - 10), BONE);
         assert_eq!(pixel(&coronal, 29 - 10, 19 - 14), BONE);

@@ -2,9 +2,8 @@
 //! upper row is as read, the lower as registered.
 
 use std::path::Path;
-use trepan_volume::{
-    Picture, RegistrationConfig, RegistrationError, bone_isovalue, hounsfield, overlap_pictures, read, register,
-};
+use trepan_render::{RgbPicture, overlap_pictures};
+use trepan_volume::{RegistrationConfig, RegistrationError, bone_isovalue, hounsfield, read, register};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let paths: Vec<String> = std::env::args().skip(1).collect();
@@ -26,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// The pictures side by side, one row before and one after registration.
-fn write(path: &Path, looks: &[[Picture; 3]]) -> Result<(), Box<dyn std::error::Error>> {
+fn write(path: &Path, looks: &[[RgbPicture; 3]]) -> Result<(), Box<dyn std::error::Error>> {
     let width: usize = looks[0].iter().map(|p| p.width).sum();
     let height = looks[0].iter().map(|p| p.height).max().unwrap_or(0);
     let mut rgb = vec![0; 3 * width * height * looks.len()];

@@ -1,0 +1,187 @@
+//! Everything that a session's forces depend on, as one value that its recording keeps.
+//!
+//! # Practice
+//! The header of a recording holds one entry for each leaf of [`SessionConfig`], named by its path:
+//! `operation.flap_mm`, `ingredients.element`, `device.scale`. A leaf that is missing has its
+//! default, so a setting that is added must default to what ran before it; entries without a field
+//! are left alone. [`old_header`] reads the headers of before 2026-11-29.
+
+mod old_header;
+
+use crate::error::SessionError;
+use crate::hand::DeviceLimits;
+use crate::ingredients::Ingredients;
+use crate::measure::Parts;
+use crate::operation::Operation;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use trepan_link::wire::SessionHeader;
+
+/// Everything that a session's forces depend on, with the reasons for its models.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct SessionConfig {
+    /// Source of the models: the name of a quality, or `replay`.
+    pub quality: String,
+    /// Reasons for the models.
+    pub why: Parts<String>,
+    /// Name of the tissue solver that ran.
+    pub solver_run: String,
+    /// Sizes of the models.
+    pub sizes: Sizes,
+    /// What the models are made of.
+    pub ingredients: Ingredients,
+    /// Settings of the operation.
+    pub operation: Operation,
+    /// Limits of the first hand's device.
+    pub device: DeviceLimits,
+    /// Limits of the second hand's device.
+    pub second_device: Option<DeviceLimits>,
+}
+
+/// Sizes of a session's models; `None` where they were not recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Sizes {
+    /// Edge of a skull voxel, mm.
+    pub spacing_mm: Option<f64>,
+    /// Number of tetrahedra.
+    pub tets: Option<usize>,
+    /// Halvings of the edge length at the opening, 0 to 4.
+    pub halvings: Option<u32>,
+    /// Resolution of the picture along an edge, as a share of the full one.
+    pub picture_detail: Option<f64>,
+    /// Whether rays are skipped where bone is smooth.
+    pub picture_sparse: bool,
+}
+
+impl SessionConfig {
+    /// Entries of a recording's header.
+    pub fn entries(&self) -> BTreeMap<String, String> {
+        let mut out = BTreeMap::new();
+        flatten(&to_value(self), String::new(), &mut out);
+        out
+    }
+
+    /// Reads a recording's header.
+    ///
+    /// # Errors
+    /// If an entry is not a value of its field.
+    pub fn of(header: &SessionHeader) -> Result<Self, SessionError> {
+        let mut value = to_value(&Self::default());
+        for (path, text) in old_header::renamed(&header.config) {
+            fill(&mut value, &path, &text);
+        }
+        let read = serde_json::from_value::<Self>(value).map_err(|fault| fault.to_string());
+        let read = read.and_then(|config| config.operation.check().map(|()| config));
+        read.map_err(|fault| {
+            SessionError::Usage(format!("the recording's header cannot be read: {fault}; its session cannot run again"))
+        })
+    }
+}
+
+fn to_value(config: &SessionConfig) -> Value {
+    serde_json::to_value(config).unwrap_or_default()
+}
+
+/// Writes the leaves below a path; empty ones are left out.
+fn flatten(value: &Value, path: String, out: &mut BTreeMap<String, String>) {
+    let text = match value {
+        Value::Object(fields) => {
+            let below = |name: &str| if path.is_empty() { name.into() } else { format!("{path}.{name}") };
+            return fields.iter().for_each(|(name, value)| flatten(value, below(name), out));
+        }
+        Value::Null => return,
+        Value::String(text) => text.clone(),
+        Value::Number(number) => decimal(number),
+        other => other.to_string(),
+    };
+    out.insert(path, text);
+}
+
+/// The shortest decimal of a number: 0.1 also where it came from an `f32`.
+fn decimal(number: &serde_json::Number) -> String {
+    let short = number.as_f64().filter(|_| number.is_f64()).map(|wide| (wide, wide as f32));
+    let short = short.filter(|(wide, short)| f64::from(*short) == *wide).map(|(_, short)| short.to_string());
+    short.unwrap_or_else(|| number.to_string())
+}
+
+/// Sets the leaf at a path: text where the default is text, else what it says as JSON.
+fn fill(value: &mut Value, path: &str, text: &str) {
+    if value.is_null() {
+        *value = Value::Object(Map::new());
+    }
+    let Value::Object(fields) = value else { return };
+    if let Some((name, rest)) = path.split_once('.') {
+        return fill(fields.entry(name).or_insert(Value::Null), rest, text);
+    }
+    let is_text = matches!(fields.get(path), Some(Value::String(_)));
+    let read = if is_text { None } else { serde_json::from_str(text).ok() };
+    fields.insert(path.into(), read.unwrap_or_else(|| Value::String(text.into())));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tissue_class::TissueClass;
+    use trepan_budget::Quality;
+
+    fn read(config: BTreeMap<String, String>) -> Result<SessionConfig, SessionError> {
+        SessionConfig::of(&SessionHeader { config, ..SessionHeader::default() })
+    }
+
+    /// A session in which no field has its default.
+    fn unusual(number: f32, share: f64) -> SessionConfig {
+        let device = DeviceLimits { peak_force_n: number, delay_ticks: 3, scale: 0.7, ..DeviceLimits::default() };
+        SessionConfig {
+            quality: "auto".into(),
+            why: Parts { bone: "12".into(), tissue: "the cheapest".into(), picture: "0.5 %".into() },
+            solver_run: "tled".into(),
+            sizes: Sizes {
+                spacing_mm: Some(share),
+                tets: Some(8000),
+                halvings: Some(4),
+                picture_detail: Some(0.3),
+                picture_sparse: true,
+            },
+            ingredients: Ingredients { friction: number, threads: Some(2), ..Ingredients::of(Quality::Fine) },
+            operation: Operation {
+                flap_mm: number,
+                flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]],
+                csf_loss: Some(0.3),
+                forbidden: vec![TissueClass::Tumour, TissueClass::Vessel],
+                opening_needed: false,
+                force_waits: false,
+                ..Operation::default()
+            },
+            device: device.clone(),
+            second_device: Some(DeviceLimits { force_scale: 0.1, ..device }),
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_to_the_last_bit() {
+        let mut random = fastrand::Rng::with_seed(1);
+        for _ in 0..500 {
+            let config = unusual(random.f32(), (random.f64() * 1e3).round() / 1e3);
+            assert_eq!(read(config.entries()).unwrap(), config);
+        }
+    }
+
+    #[test]
+    fn leaves_are_named_by_their_path_and_missing_ones_have_their_default() {
+        let entries = unusual(0.1, 0.85).entries();
+        let of = |path: &str| entries[path].as_str();
+        assert_eq!((of("operation.flap_mm"), of("device.scale"), of("sizes.spacing_mm")), ("0.1", "0.7", "0.85"));
+        assert_eq!((of("ingredients.friction"), of("why.bone")), ("0.1", "12"));
+        assert_eq!(of("operation.forbidden"), "[\"tumour\",\"vessel\"]");
+        assert_eq!(read(BTreeMap::new()).unwrap(), SessionConfig::default());
+        let unknown = BTreeMap::from([("operation.blood_ml".into(), "3".into()), ("rooms".into(), "x".into())]);
+        assert_eq!(read(unknown).unwrap(), SessionConfig::default());
+        for (path, text) in [("operation.rate_hz", "0"), ("operation.flap_mm", "wide"), ("sizes.tets", "-1")] {
+            let fault = read(BTreeMap::from([(path.into(), text.into())])).unwrap_err().to_string();
+            assert!(fault.contains("header cannot be read") && fault.contains(text), "{fault}");
+        }
+    }
+}
