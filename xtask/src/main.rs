@@ -1,5 +1,4 @@
-//! The project's own commands: `cargo xtask test | ci | fuzz | validate | merge | compare |
-//! calibrate | bundle | layers | tidy | size`.
+//! The project's own commands, `cargo xtask COMMAND`; `--help` lists them.
 
 mod bundle;
 mod constants;

@@ -29,6 +29,7 @@ mod compare;
 mod config;
 mod constants;
 mod desk;
+mod device_limits;
 mod device_test;
 mod error;
 mod force_scale;

@@ -6,8 +6,9 @@ use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
 use crate::config::SessionConfig;
+use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
-use crate::hand::{self, DeviceLimits, OpenDevice};
+use crate::hand::{self, OpenDevice};
 use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
@@ -186,8 +187,7 @@ impl Session {
         let painter = graphics.as_mut().map_err(|why| SessionError::Internal(why.to_string()))?.painter.take();
         let Some((painter, stage)) = painter.zip(self.place.window.as_ref()) else { return Ok(()) };
         let (sender, coming) = channel();
-        scene.into_iter().for_each(|record| _ = sender.send(filmed::Shot::of(record, first)));
-        drop(sender);
+        scene.into_iter().for_each(move |record| _ = sender.send(filmed::Shot::of(record, first)));
         let until_s = self.options.duration.unwrap_or(f64::INFINITY);
         player::show(first, coming, painter, &self.opened(stage), &recording, until_s, &stop);
         Ok(())
@@ -203,9 +203,8 @@ impl Session {
             Some(name) => Some(OpenDevice::second(name, options, plan, rate_hz)?),
             None => self.recording.as_ref().filter(|r| !r.second.is_empty()).map(|_| OpenDevice::default()),
         };
-        let limits = self.limits(&hand, &self.recorded.device);
-        let of_second = self.recorded.second_device.clone().unwrap_or_default();
-        let second_limits = second.as_ref().map(|second| self.limits(second, &of_second));
+        let limits = self.limits(&hand, Some(&self.recorded.device));
+        let second_limits = second.as_ref().map(|second| self.limits(second, self.recorded.second_device.as_ref()));
         let (header, date) = (self.header(&limits, second_limits.as_ref()), output::now());
         // Before the last preparations: a watcher loads beside them.
         let (share, asked) = self.options.share.as_deref().map(|name| Share::open(name, &header)).transpose()?.unzip();
@@ -411,11 +410,11 @@ impl Session {
 
     /// Limits of a hand's device; the recorded ones, if none is open. A watcher's bone gives way as
     /// the trainee's does.
-    fn limits(&self, hand: &OpenDevice, recorded: &DeviceLimits) -> DeviceLimits {
+    fn limits(&self, hand: &OpenDevice, recorded: Option<&DeviceLimits>) -> DeviceLimits {
         let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
         let of = |device: &dyn HapticDevice| DeviceLimits::of(&device.capabilities(), scale, self.options.force_scale);
         let device = hand.device.as_deref().filter(|_| self.watched.is_none());
-        device.map_or_else(|| recorded.clone(), of)
+        device.map_or_else(|| recorded.cloned().unwrap_or_default(), of)
     }
 
     /// Tool before the first reading of its device. A replay starts here too, because the first

@@ -8,8 +8,8 @@
 
 mod old_header;
 
+use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
-use crate::hand::DeviceLimits;
 use crate::ingredients::Ingredients;
 use crate::measure::Parts;
 use crate::operation::Operation;
