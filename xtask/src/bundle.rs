@@ -58,7 +58,7 @@ fn make(root: &Path, out: &Path, (profile, flags): (&str, &[&str])) -> Result<()
     strip.arg("-o").arg(bin.join("measure")).arg(target.join(profile).join("measure"));
     ensure!(strip.status().context("strip, of binutils")?.success(), "strip failed");
     copy(&root.join("fixtures/case-head"), &bin.join("fixtures/case-head"))?;
-    copy(&root.join("crates/trials/limits"), &bin.join("limits"))?;
+    copy(&root.join("crates/evidence/limits"), &bin.join("limits"))?;
     fs::copy(root.join("crates/trials/src/suites/rivals/mujoco_warp.py"), out.join("mujoco_warp.py"))?;
     fs::write(out.join("measure"), MEASURE)?;
     fs::set_permissions(out.join("measure"), fs::Permissions::from_mode(0o755))?;

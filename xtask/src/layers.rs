@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 6] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
-    &["voxel-size", "budget", "window"],
+    &["voxel-size", "budget", "window", "evidence"],
     &["simulator"],
     &["trials", "craniotomy", "brain", "integrated"],
 ];
@@ -31,17 +31,20 @@ const KEPT: [(&str, &[&str]); 8] = [
     ("iceoryx2", &["link"]),
     ("clap", &["simulator", "trials"]),
     ("tracing", &["simulator", "craniotomy", "brain", "integrated"]),
-    ("anyhow", &["simulator", "craniotomy", "brain", "integrated", "trials"]),
+    ("anyhow", &["evidence", "simulator", "craniotomy", "brain", "integrated", "trials"]),
     ("trepan-trials", &[]),
 ];
 
 /// Words in the sources that only some crates may use (tests and examples are free).
 const WORDS: [(&str, &[&str]); 6] = [
-    ("Instant::now", &["simulator", "trials", "gpu", "window", "render", "emulators"]),
-    ("SystemTime", &["link", "simulator", "trials"]),
+    ("Instant::now", &["simulator", "evidence", "trials", "gpu", "window", "render", "emulators"]),
+    ("SystemTime", &["link", "simulator", "evidence", "trials"]),
     ("thread::sleep", &["simulator", "trials", "emulators"]),
     ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
-    ("std::fs", &["volume", "mesh", "link", "haptics", "render", "window", "simulator", "trials", "emulators"]),
+    (
+        "std::fs",
+        &["volume", "mesh", "link", "haptics", "render", "window", "simulator", "evidence", "trials", "emulators"],
+    ),
     ("unsafe {", &["haptics", "soft", "simulator", "emulators"]),
 ];
 

@@ -4,9 +4,9 @@
 //! TITLE-BEGINS]...`; without names, the three charts of the top README.
 
 use std::path::Path;
-use trepan_trials::engine::files::whole;
-use trepan_trials::engine::plot;
-use trepan_trials::engine::store::report;
+use trepan_evidence::files::whole;
+use trepan_evidence::plot;
+use trepan_evidence::store::report;
 use trepan_trials::suites::ALL;
 
 const OF_README: [(&str, &str); 3] = [

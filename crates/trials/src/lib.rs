@@ -17,6 +17,5 @@
 //! In an app or a simulator: nothing there may depend on this crate.
 
 pub mod calibration;
-pub mod engine;
 pub mod population;
 pub mod suites;

@@ -6,12 +6,12 @@ use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use trepan_evidence::files::whole;
+use trepan_evidence::part::Scope;
+use trepan_evidence::report::{Making, Report};
+use trepan_evidence::suite::Gate;
+use trepan_evidence::{limits, page};
 use trepan_gpu::{Gpu, GpuError, Prefer};
-use trepan_trials::engine::files::whole;
-use trepan_trials::engine::part::Scope;
-use trepan_trials::engine::report::{Making, Report};
-use trepan_trials::engine::suite::Gate;
-use trepan_trials::engine::{limits, page};
 use trepan_trials::suites::ON_REQUEST;
 
 /// No further part is begun after this time.

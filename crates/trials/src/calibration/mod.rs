@@ -9,13 +9,13 @@ pub mod least_squares;
 pub mod regions;
 pub mod relaxation;
 
-use crate::engine::curve;
-use crate::engine::files::whole;
-use crate::engine::picture::Series;
 use anyhow::{Context, Result};
 use regions::{Fit, Form, Mode, PULLED, Region};
 use std::fmt::Write;
 use std::path::Path;
+use trepan_evidence::curve;
+use trepan_evidence::files::whole;
+use trepan_evidence::picture::Series;
 use trepan_measurements::{brain_living, brain_relaxation, fits, living};
 
 /// A row of the table of fits.

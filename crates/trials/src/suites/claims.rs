@@ -5,8 +5,8 @@
 //! Numbers of now come from the rows of the run. Times are shares of another method's in the same
 //! run, so that machines compare; those of before were measured the same way and stand in the code.
 
-use crate::engine::picture::Table;
-use crate::engine::suite::{Row, shown};
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::{Row, shown};
 use trepan_geometry::quantile;
 
 /// What a paper claims of a method.

@@ -1,8 +1,8 @@
 //! Runs every method under every condition and returns a stability map and one row per method.
 
-use crate::engine::picture::{Map, Outcome};
-use crate::engine::suite::{Findings, Row};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use trepan_evidence::picture::{Map, Outcome};
+use trepan_evidence::suite::{Findings, Row};
 
 /// Runs every method under every condition. A panic fails only its cell, not the run.
 pub fn judge<M>(

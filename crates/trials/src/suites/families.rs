@@ -4,12 +4,12 @@
 //! The method lists come from the crates. A method that is added there and not measured here is
 //! reported as a hole, and a hole fails a run of all suites.
 
-use crate::engine::part::Suite;
-use crate::engine::picture::Outcome;
-use crate::engine::report::Report;
-use crate::engine::suite::{Row, shown};
-use crate::engine::timer::Samples;
 use serde::Serialize;
+use trepan_evidence::part::Suite;
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::report::Report;
+use trepan_evidence::suite::{Row, shown};
+use trepan_evidence::timer::Samples;
 
 /// A family of methods that answer the same question.
 struct Family {
@@ -178,16 +178,16 @@ fn unit(metric: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::part::Scope;
     use crate::suites::ALL;
+    use trepan_evidence::part::Scope;
 
     #[test]
     fn only_families_without_measurements_have_holes_one_for_each_method() {
         let suite = ALL.iter().find(|suite| suite.name == "force").unwrap();
         let scope = Scope { quick: true, seed: 1 };
         let parts = (suite.parts)(scope);
-        let made = |part: crate::engine::part::Part| {
-            (part.slug(), crate::engine::report::Making::here(scope), part.run(scope).0)
+        let made = |part: trepan_evidence::part::Part| {
+            (part.slug(), trepan_evidence::report::Making::here(scope), part.run(scope).0)
         };
         let mut report = Report::of(suite, parts.into_iter().map(made).collect()).unwrap();
         assert_eq!(holes(&[(suite, report.clone())]), Vec::<String>::new());

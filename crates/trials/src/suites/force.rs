@@ -15,14 +15,14 @@
 //! contact found by the god-object constrained to planes; all others use the nearest face.
 
 use super::{Part, Scope};
-use crate::engine::picture::{Chart, Mark, Outcome};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::conditions;
 use trepan_contact::{
     Contact, ContactManifold, ForceGuard, ForceModel, ForceShading, Friction, GodObject, GuardConfig, Hooke, Plane,
     Vibration, Viscoelastic,
 };
+use trepan_evidence::picture::{Chart, Mark, Outcome};
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Pose, ToolState, Twist, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;

@@ -26,8 +26,8 @@ pub mod tled;
 mod volume;
 mod voxel_size;
 
-use crate::engine::part::nothing_more;
-pub use crate::engine::part::{Part, Scope, Suite};
+use trepan_evidence::part::nothing_more;
+pub use trepan_evidence::part::{Part, Scope, Suite};
 
 /// Suites that run only when named: they need a graphics card,
 /// download other programs, or take an hour.
@@ -208,7 +208,7 @@ mod tests {
     fn every_part_has_a_unique_file_name() {
         for suite in ALL.iter().chain(ON_REQUEST) {
             for quick in [true, false] {
-                let names = crate::engine::report::slugs(suite, Scope { quick, seed: 1 });
+                let names = trepan_evidence::report::slugs(suite, Scope { quick, seed: 1 });
                 assert!(!names.is_empty() && names.iter().all(|name| !name.is_empty()));
                 assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "{}: {names:?}", suite.name);
             }

@@ -2,10 +2,10 @@
 
 use super::change::{BONE_N, PICTURE_PERCENT, SHOWN_MM, tissue_tolerance_n};
 use super::{AGAIN, EFFECT, LEFT_OUT, NOT_RUN, SCENE};
-use crate::engine::picture::{Chart, Mark, Table};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use crate::suites::scripted::worst;
+use trepan_evidence::picture::{Chart, Mark, Table};
+use trepan_evidence::suite::{Findings, Gate, Row};
 
 /// Change of a force and of the shown surface that rounding may make, N and mm.
 const ROUNDING_N: f64 = 1e-3;
@@ -229,7 +229,7 @@ mod tests {
         let mut findings = Findings { rows, ..Findings::default() };
         let scope = Scope { quick: true, seed: 1 };
         judge(scope, &mut findings);
-        crate::engine::limits::mark("ablation", scope, &mut findings.gates);
+        trepan_evidence::limits::mark("ablation", scope, &mut findings.gates);
         findings
     }
 

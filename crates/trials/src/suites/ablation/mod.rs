@@ -36,12 +36,12 @@ pub use judge::judge;
 
 use super::scripted::{Prepared, Ride};
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::Result;
 use change::Change;
 use pictures::Pictures;
 use std::sync::Mutex;
 use trepan_budget::Quality;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_render::Image;
 use trepan_simulator::{Effect, Variant, of_quality, realistic, variants};
 

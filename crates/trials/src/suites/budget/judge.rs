@@ -8,11 +8,11 @@
 //! other choice meets it, is a miss but no broken word.
 
 use super::super::Scope;
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
-use crate::engine::worst::{self, Rank};
 use std::collections::BTreeMap;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
+use trepan_evidence::worst::{self, Rank};
 
 const KINDS: [&str; 3] = ["bone", "tissue", "picture"];
 const METHODS: [&str; 5] = ["auto", "draft", "usual", "fine", "cheapest"];

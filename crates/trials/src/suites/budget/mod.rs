@@ -19,11 +19,11 @@ pub mod training;
 mod trial;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use case::{Case, Source};
 pub use judge::judge;
 use scene::Situation;
 use trepan_budget::{Bone, Scene};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_simulator::measure::bone::Stretch;
 

@@ -13,9 +13,9 @@
 use super::super::Scope;
 use super::case::{Case, Source};
 use super::scene::MACHINE;
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Row};
 use trepan_budget::Tissue;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Row};
 use trepan_simulator::Element;
 use trepan_simulator::measure::tissue::{Brains, Fineness, Push};
 

@@ -2,12 +2,12 @@
 
 use super::case::{Case, Source};
 use super::scene::Situation;
-use crate::engine::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{
     Bone, Choice, FEATURES, Kind, Machine, Picture, Plan, Quality, Row as Laws, Rows, Scene, Setup, Tissue,
     TissueForce, bone_error_n, holds_walls, plan_with, tissue_over,
 };
+use trepan_evidence::suite::{Findings, Row};
 use trepan_simulator::measure::CaseErrors;
 use trepan_simulator::measure::bone::Stretch;
 use trepan_simulator::measure::picture::View;

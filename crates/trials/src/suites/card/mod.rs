@@ -12,8 +12,8 @@ mod session;
 mod step;
 
 use super::{Part, Scope};
-use crate::engine::picture::Table;
-use crate::engine::suite::{Findings, Row, shown};
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::{Findings, Row, shown};
 use trepan_gpu::{Gpu, Prefer};
 
 /// A part's work on an open device.

@@ -7,11 +7,11 @@
 //! without vertical sync does. Device: the card's own clock over all passes.
 
 use super::row;
-use crate::engine::suite::{Findings, Gate};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use crate::suites::render::scenes::{SKULLS, brain, frame, skull, swaying};
 use glam::{IVec3, Vec3};
+use trepan_evidence::suite::{Findings, Gate};
+use trepan_evidence::timer::Samples;
 use trepan_gpu::Gpu;
 use trepan_render::{Frame, ProcessorRenderer, Renderer, SceneData};
 use trepan_volume::AIR_HU;

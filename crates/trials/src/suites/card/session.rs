@@ -8,12 +8,12 @@
 
 use super::row;
 use super::step::pressed;
-use crate::engine::suite::{Findings, Gate};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use crate::suites::render::scenes;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::Vec3;
 use trepan_gpu::Gpu;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};

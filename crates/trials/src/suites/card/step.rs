@@ -7,10 +7,10 @@
 //! number that a pass reads or writes; numbers of nodes once a pass, since caches serve the rest.
 
 use super::{floors, row};
-use crate::engine::suite::{Findings, Gate};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use trepan_contact::{NodalContact, NodalContacts};
+use trepan_evidence::suite::{Findings, Gate};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Vec3, units};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};

@@ -12,11 +12,11 @@ mod truth;
 pub use recording::record_all;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use ride::{Ride, START, ride};
 use scene::{PATHS, Scene};
 use trepan_deformable::Method;
 use trepan_deformable::rivals::uniform_grid;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use truth::Truth;
 
@@ -109,7 +109,7 @@ fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &m
 /// the scan is as required.
 fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findings) {
     let best = Method::RECOMMENDED.name();
-    let beaten = crate::engine::front::dominated(&findings.rows, place, best, "step_p50_us", "depth_error_p95_mm");
+    let beaten = trepan_evidence::front::dominated(&findings.rows, place, best, "step_p50_us", "depth_error_p95_mm");
     findings.gates.push(Gate::at_most(format!("{place}: methods that beat {best} in both"), beaten as f64, 0.0));
     if scene.mesh.tets.len() > 48_000 {
         let of = |method| rides.iter().find(|ride| ride.method == method);

@@ -2,8 +2,8 @@
 //! may be missed.
 
 use super::{Part, Scope, scene::five_split, truth::inside};
-use crate::engine::suite::{Findings, Gate, Row};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 
 const CELLS: usize = 6;

@@ -4,9 +4,9 @@
 //! The thesis's text, on its machine of 2012; abstracts of the papers named. Times of before: quick
 //! runs of the same scenes, the trees refitted whole in every step and asked point by point.
 
-use crate::engine::picture::Table;
-use crate::engine::suite::Row;
 use crate::suites::claims::{Claim, Former, Scale, Test, as_published, before_and_now};
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::Row;
 
 /// Models of Tables 4.1 and 4.2: name, tetrahedra, cell, mm, and whether every step kept within 1
 /// ms (Figures 4.8 and 4.12).

@@ -1,10 +1,10 @@
 //! A tool taken along a path by one method, and what the truth says about every step.
 
 use super::{finite, scene::RADIUS_MM, scene::Scene, truth::Truth};
-use crate::engine::suite::Row;
-use crate::engine::timer::Samples;
 use trepan_contact::Viscoelastic;
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
+use trepan_evidence::suite::Row;
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Pointshell, Pose, Tool, ToolState, Vec3, quantile};
 
 /// Steps in which a method may still get to know the mesh; their time is reported by itself.

@@ -2,10 +2,10 @@
 //! stand still, leap or run away.
 
 use super::{Scope, is_complete, truth::inside};
-use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::conditions;
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::TetMesh;
 

@@ -5,10 +5,10 @@
 //! of a ball is known in closed form: how far it was pushed past the side.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::deformable::scene::{self, Scene};
 use crate::suites::deformable::stability::{self, EDGE_MM, PLAIN, cube, endure};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
+use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 
 /// Largest share of the points inside that may be missed or invented.

@@ -2,8 +2,8 @@
 //! at an edge.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::force::{CHOSEN, Model, Press, QUIET_MM, models, press_into, slid_over_an_edge};
+use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
 use trepan_haptics::simulated::HandModel;
 
 /// Largest change of force in a tick, N.

@@ -4,8 +4,8 @@
 //! # Theory
 //! A condition (speed, stiffness, delay, time step, Poisson's ratio, element quality, size) is
 //! changed alone from a value at which sessions work, outwards and then by bisection
-//! ([`nearest`](crate::engine::nearest)). The nearest failure of a method is that of the condition
-//! with the smallest factor, |log₂(factor)|.
+//! ([`nearest`](trepan_evidence::nearest)). The nearest failure of a method is that of the
+//! condition with the smallest factor, |log₂(factor)|.
 //!
 //! # Practice
 //! A verdict is physical and the same for all methods of a family: closed forms, f64 oracles and
@@ -21,11 +21,11 @@ mod table;
 mod voxel_size;
 
 use super::{Part, Scope};
-use crate::engine::nearest::{Condition, Failure, Tried};
-use crate::engine::picture::Series;
-use crate::engine::report::Report;
-use crate::engine::suite::{Findings, Row};
 use serde_json::Value;
+use trepan_evidence::nearest::{Condition, Failure, Tried};
+use trepan_evidence::picture::Series;
+use trepan_evidence::report::Report;
+use trepan_evidence::suite::{Findings, Row};
 
 /// Distance between trials on the way outwards, octaves: of a quick run and of a full one.
 const STEP: [f64; 2] = [1.0, 0.5];

@@ -1,7 +1,6 @@
 //! Picture: rays that pass through bone, or stop beside it.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::render::accuracy::{march, rays};
 use crate::suites::render::faults::{Drawer, drawers, made_or_empty};
 use crate::suites::render::scenes::{ISO, frame};
@@ -11,6 +10,7 @@ use rayon::prelude::*;
 use std::rc::Rc;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
+use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::Frame;
 

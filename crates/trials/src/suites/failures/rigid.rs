@@ -10,10 +10,10 @@
 //! ```
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
 use crate::suites::rigid::coupling::{self, QUIET_MM};
 use crate::suites::rigid::solid::{KINDS, RADIUS_MM};
 use crate::suites::rigid::{STIFFNESS, walls};
+use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
 use trepan_geometry::{Tool, Vec3};
 use trepan_haptics::simulated::Config;
 use trepan_rigid::{Method, RigidStep};

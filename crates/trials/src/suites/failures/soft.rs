@@ -10,11 +10,11 @@
 //! The held end, which cannot narrow, stiffens a real bar by a few percent.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial, exceeds};
-use crate::engine::picture::Outcome;
 use crate::suites::tled::closed_forms::{free_side, kirchhoff};
 use crate::suites::tled::rivals::{LONGEST_MS, Left, STILL, Solver, brain, left, let_go_seen, pressed, steps};
 use crate::suites::tled::stability::offset;
+use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
+use trepan_evidence::picture::Outcome;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 

@@ -1,9 +1,9 @@
 //! Tables and maps of nearest failures, and the gates on them.
 
 use super::{Listed, Standing, amount, text, title};
-use crate::engine::picture::{Map, Outcome, Table};
-use crate::engine::suite::{Findings, Gate, Row};
 use serde_json::Value;
+use trepan_evidence::picture::{Map, Outcome, Table};
+use trepan_evidence::suite::{Findings, Gate, Row};
 
 const COLUMNS: [&str; 8] = ["family", "method", "whose", "condition", "nominal", "fails at", "factor", "how it fails"];
 
@@ -158,7 +158,7 @@ pub fn judge(families: &[Listed], findings: &mut Findings) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::picture::Series;
+    use trepan_evidence::picture::Series;
 
     fn row(method: &str, standing: &str, condition: &str, factor: Option<f64>) -> Row {
         let row = Row::new(condition, method).with("family", "rigid").with("standing", standing);

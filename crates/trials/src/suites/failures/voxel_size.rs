@@ -1,9 +1,9 @@
 //! Voxel size: a rule whose grid works more than twice as hard as the best one.
 
 use super::{Candidate, Family, Scope, Standing};
-use crate::engine::nearest::{Condition, Scale, Trial};
 use crate::suites::voxel_size::odd::{PRICES, Scene, cloud, ladder, row_of_boxes, size_by, work};
 use crate::suites::voxel_size::{OURS, RULES};
+use trepan_evidence::nearest::{Condition, Scale, Trial};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_voxel_size::Prices;
 

@@ -1,8 +1,8 @@
 //! Maps of wall stability: stiffness by delay and damping, one map for each device, hand and way of
 //! guarding, with theoretical bounds.
 
-use crate::engine::picture::{Map, Outcome};
-use crate::engine::suite::Row;
+use trepan_evidence::picture::{Map, Outcome};
+use trepan_evidence::suite::Row;
 
 /// Ways of guarding: key in the row and name in the title.
 const WAYS: [(&str, &str); 3] = [("unguarded", "bare"), ("guarded", "guarded"), ("limited", "guarded and limited")];

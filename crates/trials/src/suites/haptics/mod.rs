@@ -33,9 +33,9 @@ mod maps;
 mod pace;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use coupling::{Coupling, MILLION};
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;

@@ -9,8 +9,6 @@
 //! one, else on the CPU. Counts and times are reported without gates.
 
 use super::Scope;
-use crate::engine::suite::Row;
-use crate::engine::timer::Samples;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -18,6 +16,8 @@ use std::time::{Duration, Instant};
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, Viscoelastic};
+use trepan_evidence::suite::Row;
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, units};
 use trepan_gpu::Prefer;
 use trepan_haptics::HapticDevice;

@@ -7,10 +7,10 @@
 use super::comparison::{Comparison, How};
 use crate::calibration::regions::{Fit, Form, Mode, PULLED, Region};
 use crate::calibration::{drawn, of_program, relaxation};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::{Part, Scope};
 use glam::Mat3;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::Vec3;
 use trepan_measurements::{Row, brain, brain_living, brain_rate, brain_relaxation, fits, tissue};
 use trepan_simulator::TissueClass;

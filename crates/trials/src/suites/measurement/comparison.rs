@@ -4,8 +4,8 @@
 //! Inside is within one standard deviation of the published value; where none was published, within
 //! [`NO_SPREAD`] of it. A value that took part in a fit is called fitted, any other predicted.
 
-use crate::engine::suite::Row;
 use serde_json::Value;
+use trepan_evidence::suite::Row;
 use trepan_measurements::Row as Measured;
 
 /// Share of a value within which ours is inside where no spread was published.

@@ -14,12 +14,12 @@
 //! rows say. How a group notices that the bone gave way, by touch, sound or sight, is assumed.
 
 use super::comparison::{Comparison, How};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::rigid::bones::head;
 use crate::suites::{Part, Scope};
 use glam::{DVec3, IVec3};
 use trepan_bone::BoneVolume;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_measurements::{Row, drilling, hands, skull};
 use trepan_rigid::removal::{Cutter, FORCE_SCALE, Pressed, RemovalLaw};

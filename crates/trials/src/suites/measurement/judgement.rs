@@ -1,9 +1,9 @@
 //! The table "Against measurement", its counts, and the limits on them.
 
 use super::comparison::{Comparison, How};
-use crate::engine::picture::Table;
-use crate::engine::suite::{Findings, Gate, shown};
 use crate::suites::Scope;
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::{Findings, Gate, shown};
 
 /// Published values that the page compares, at least: this project's goal.
 const LEAST_VALUES: f64 = 40.0;

@@ -6,13 +6,13 @@
 //! program's brain at the same speed, and the same formula reads the force.
 
 use super::comparison::{Comparison, How};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::tled::outside::{Pressed, Shape, Size};
 use crate::suites::{Part, Scope};
 use anyhow::Result;
 use trepan_budget::Quality;
 use trepan_contact::NodalContacts;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_measurements::living;
 use trepan_simulator::measure::tissue::{MASS_ADDED, PressedBall};
 use trepan_simulator::{Ingredients, TissueClass};

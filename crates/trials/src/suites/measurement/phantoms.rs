@@ -10,10 +10,10 @@
 //! ways, are predicted.
 
 use super::comparison::{Comparison, How};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::tled::slender::Rod;
 use crate::suites::{Part, Scope};
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::{Vec3, units};
 use trepan_measurements::{Row as Measured, phantom_rod, phantom_rubber, phantom_silicone};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};

@@ -8,10 +8,10 @@
 //! 3 mm.
 
 use super::{Part, Scope, faults};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::population::{BaseHead, Head, HeadRecipe, base_heads};
 use anyhow::{Context, Result};
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, quantile};
 use trepan_mesh::lattice::{Config, Domain, LabelledMesh};
 use trepan_mesh::{Quality, Surface};

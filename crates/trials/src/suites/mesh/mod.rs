@@ -8,10 +8,10 @@ mod scenes;
 mod spots;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use scenes::{Border, Scene};
 use spots::{Spots, faces, samples};
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, quantile};
 use trepan_mesh::lattice::{self, LabelledMesh};
 use trepan_mesh::{Quality, Surface, TetMesh, Topology};

@@ -2,9 +2,9 @@
 
 use super::PROVEN_DEG;
 use super::scenes::voxels;
-use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::conditions;
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_mesh::lattice::{self, Config, Fine};
 use trepan_mesh::{Quality, Surface};

@@ -10,12 +10,12 @@
 use super::super::{Part, Scope};
 use super::scenes::{self, Scene};
 use super::spots::{Spots, faces, samples};
-use crate::engine::suite::{Findings, Row};
 use crate::suites::python::Workshop;
 use anyhow::{Context, Result};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Row};
 use trepan_geometry::quantile;
 use trepan_mesh::{Quality, Surface, TetMesh, lattice, obj};
 

@@ -13,13 +13,13 @@
 //! The budget changes one thing at a time and leaves the rest exact.
 
 use super::Scope;
-use crate::engine::suite::{Findings, Row};
 use crate::suites::rigid;
 use crate::suites::scripted::{FELT_N, OPENING, milliseconds, path};
 use crate::suites::simulators::case;
 use anyhow::Result;
 use glam::DVec3;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::{Findings, Row};
 use trepan_geometry::{Buttons, Tool, Vec3, quantile};
 use trepan_haptics::script::{Script, Site};
 use trepan_rigid::removal::RemovalLaw;

@@ -25,14 +25,14 @@ mod setups;
 
 use super::scripted::{Prepared, Ride, worst};
 use super::{Part, Scope};
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::{Result, anyhow, ensure};
 use bone::Felt;
 use error::Errors;
 use setups::Candidate;
 use std::sync::Mutex;
 use trepan_budget::Scene;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
 
 /// What the rows are called.
 const SCENE: &str = "drill, open, press the brain";

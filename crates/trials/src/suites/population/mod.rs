@@ -18,8 +18,6 @@
 mod ride;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::worst::{self, Rank};
 use crate::population::{BaseHead, Files, Head, HeadRecipe, base_heads};
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -27,6 +25,8 @@ use ride::{FLAP, HOLE, Ride, Task};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use trepan_budget::{Machine, Rows, Setup};
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::worst::{self, Rank};
 use trepan_geometry::Vec3;
 use trepan_simulator::{Inputs, Options, Program, Session};
 use trepan_volume::{VoxelVolume, nifti, resample};

@@ -3,11 +3,11 @@
 
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, FINE_VOXEL, Hits, SPARSE, Setting};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use glam::{DVec3, IVec3, Vec2, Vec3};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_gpu::Gpu;
 use trepan_render::{Casting, Frame, Hit, View};
 use trepan_volume::{AIR_HU, VoxelVolume};

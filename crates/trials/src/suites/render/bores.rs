@@ -8,12 +8,12 @@
 use super::likeness::similarity;
 use super::scenes::{ISO, frame};
 use super::{By, EXACT, Hits};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Pose, Tool, ToolState};
 use trepan_gpu::Gpu;
 use trepan_render::{Hit, Image, View};

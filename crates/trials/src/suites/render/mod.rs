@@ -12,9 +12,9 @@ pub(super) mod scenes;
 pub(super) mod speed;
 
 use super::{Part, Scope};
-use crate::engine::suite::Findings;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::Findings;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::{Casting, Frame, Hit, Image, ProcessorRenderer, Renderer, SceneData, View};
 

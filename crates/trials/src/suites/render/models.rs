@@ -7,12 +7,12 @@
 
 use super::scenes::{SKULLS, brain, frame, skull, swaying};
 use super::{By, EXACT, SPARSE, Setting};
-use crate::engine::suite::{Findings, Row};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use glam::Vec3;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::{Findings, Row};
+use trepan_evidence::timer::Samples;
 use trepan_gpu::Gpu;
 use trepan_render::{Camera, Cut, Frame, SceneData};
 

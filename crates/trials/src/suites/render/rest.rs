@@ -6,10 +6,10 @@
 //! against 4 x 4 samples in every pixel of the 3-D view.
 
 use super::scenes::{SKULLS, brain, frame, skull, swaying};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use glam::Vec3;
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_render::{Camera, Casting, Frame, Image, ProcessorRenderer, SceneData, SliceLook};
 

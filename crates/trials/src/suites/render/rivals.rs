@@ -11,13 +11,13 @@
 
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, SPARSE, Setting};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::python::Workshop;
 use crate::suites::{Part, Scope};
 use anyhow::{Context, Result, ensure};
 use glam::Vec3;
 use std::path::Path;
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_render::{Casting, Image};
 
 /// Draws with VTK.

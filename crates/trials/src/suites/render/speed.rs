@@ -3,11 +3,11 @@
 use super::likeness::similarity;
 use super::scenes::{frame, head};
 use super::{By, EXACT, FINE_VOXEL, SPARSE, Setting};
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::Scope;
 use glam::Vec3;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_gpu::Gpu;
 use trepan_render::Casting;
 

@@ -2,10 +2,10 @@
 
 use super::solid::{ISO, KINDS, Kind, Moment, RADIUS_MM, Scene, directions};
 use super::{STIFFNESS, worst_chart};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::{Part, Scope};
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
 

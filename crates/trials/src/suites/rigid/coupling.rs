@@ -18,11 +18,11 @@
 
 use super::solid::{RADIUS_MM, held, voxels};
 use super::{map_of, passes};
-use crate::engine::picture::{Map, Outcome};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use trepan_bone::BoneVolume;
 use trepan_contact::{Contact, ForceGuard, ForceModel, GuardConfig, Hooke};
+use trepan_evidence::picture::{Map, Outcome};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;

@@ -14,10 +14,10 @@
 use super::coupling;
 use super::recording::{self, Place, Task};
 use super::solid::{ISO, RADIUS_MM, held};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;

@@ -7,10 +7,10 @@
 //! before.
 
 use super::solid::{ISO, RADIUS_MM, held, voxels};
-use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate};
 use crate::suites::conditions;
 use trepan_bone::BoneVolume;
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::suite::{Findings, Gate};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::{AIR_HU, VoxelVolume};

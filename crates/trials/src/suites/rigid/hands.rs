@@ -21,11 +21,11 @@
 
 use super::bones::{SKULLS, head, skull};
 use super::{STIFFNESS, worst_chart};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use glam::DVec3;
 use std::time::Instant;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone, Scan};

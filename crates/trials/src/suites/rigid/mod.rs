@@ -26,8 +26,8 @@ pub use bones::head;
 pub use recording::record_all;
 
 use super::{Part, Scope};
-use crate::engine::picture::{Chart, Map, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
+use trepan_evidence::picture::{Chart, Map, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_rigid::Method;
 
 /// Stiffness that converts depths to forces, N/mm: the thesis's.

@@ -20,10 +20,10 @@
 
 use super::STIFFNESS;
 use super::solid::directions;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use glam::DVec3;
 use trepan_bone::BoneVolume;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::removal::{Pressed, RemovalLaw};
 use trepan_rigid::{Method, RigidStep};

@@ -7,7 +7,7 @@
 //! most 0.4 N when drilling. The machine is of 2012: compare the ratio to `thesis`, not these.
 
 use super::BUDGET_US;
-use crate::engine::suite::Row;
+use trepan_evidence::suite::Row;
 
 /// The name on charts.
 const NAME: &str = "thesis, its own figures";

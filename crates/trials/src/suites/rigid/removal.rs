@@ -18,13 +18,13 @@
 
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use crate::suites::{Part, Scope};
 use glam::{DVec3, IVec3};
 use std::f64::consts::PI;
 use std::time::Instant;
 use trepan_bone::{BoneVolume, cut_depth};
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Method, RigidStep};

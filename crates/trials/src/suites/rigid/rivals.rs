@@ -22,11 +22,11 @@
 
 use super::solid::{RADIUS_MM, directions, held, voxels};
 use super::{BUDGET_US, STIFFNESS};
-use crate::engine::picture::Table;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use glam::DVec3;
 use trepan_bone::BoneVolume;
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::rivals::{burr_and_shaft, centre_line, thesis};
 use trepan_rigid::{Method, RigidContact, RigidStep};

@@ -2,10 +2,10 @@
 //! loop misses on the same machine.
 
 use super::solid::RADIUS_MM;
-use crate::engine::suite::Row;
 use std::time::{Duration, Instant};
 use trepan_bone::BoneVolume;
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
+use trepan_evidence::suite::Row;
 use trepan_geometry::{Buttons, Tool, ToolState};
 use trepan_rigid::{Method, RigidStep};
 

@@ -15,10 +15,10 @@
 
 use super::solid::{directions, held, voxels};
 use super::{STIFFNESS, map_of, passes};
-use crate::engine::picture::{Map, Outcome};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use trepan_bone::BoneVolume;
+use trepan_evidence::picture::{Map, Outcome};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
 

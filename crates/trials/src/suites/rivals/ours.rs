@@ -1,10 +1,10 @@
 //! TLED and the solvers of `trepan-soft` on the block that the other programs step.
 
 use super::{GRAVITY_SHARE, LONGEST_S, Run, SIMULATED_MS, Sample, Solution, block, scene_name, sizes};
-use crate::engine::suite::Findings;
 use crate::suites::Scope;
 use cpu_time::ProcessTime;
 use std::time::Instant;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Method, SoftSolver};
 use trepan_tled::{Config, Tled};

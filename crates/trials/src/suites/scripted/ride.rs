@@ -3,7 +3,6 @@
 
 use super::surface::{Look, Rays};
 use super::{LOOK_MS, OPENING, PLACE_MM, Scope, disc};
-use crate::engine::memory::held_mb;
 use crate::suites::simulators::case;
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -11,6 +10,7 @@ use cpu_time::ProcessTime;
 use std::time::Instant;
 use trepan_bone::BoneVolume;
 use trepan_contact::SurfacePatch;
+use trepan_evidence::memory::held_mb;
 use trepan_geometry::{ToolState, Vec3};
 use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{Reading, Status};

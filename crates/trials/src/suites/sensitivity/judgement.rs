@@ -1,9 +1,9 @@
 //! Tables of ranks, conclusions and limits over the rows of all scenes.
 
-use crate::engine::picture::{Series, Table};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use std::collections::BTreeMap;
+use trepan_evidence::picture::{Series, Table};
+use trepan_evidence::suite::{Findings, Gate, Row};
 
 /// Largest error of an index on the closed forms.
 const INDEX_ERROR: f64 = 0.02;

@@ -22,8 +22,8 @@ mod sobol;
 pub use judgement::judge;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Row};
 use scene::{OUTPUTS, Scene};
+use trepan_evidence::suite::{Findings, Row};
 
 /// Constants whose variance is shared out.
 const RANKED: usize = 4;

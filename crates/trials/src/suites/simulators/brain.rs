@@ -11,9 +11,9 @@
 
 use super::bench::config;
 use super::case;
-use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::Result;
 use std::sync::Arc;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_simulator::{

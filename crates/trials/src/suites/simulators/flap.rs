@@ -3,8 +3,8 @@
 
 use super::bench::Bench;
 use super::case::CaseFixture;
-use crate::engine::suite::{Findings, Gate, Row};
 use trepan_bone::Piece;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_haptics::script::{Plan, Script};
 use trepan_haptics::simulated::HandModel;
 use trepan_simulator::{PlanComparison, Program, What};

@@ -8,8 +8,8 @@
 
 use super::bench::Bench;
 use super::case::CaseFixture;
-use crate::engine::suite::{Findings, Gate, Row};
 use trepan_contact::GuardedWrench;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Plan, Script};
 use trepan_haptics::simulated::HandModel;

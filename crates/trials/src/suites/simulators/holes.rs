@@ -11,11 +11,11 @@
 //! ```
 
 use super::bench::Bench;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_contact::GuardedWrench;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
 use trepan_haptics::simulated::HandModel;
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};

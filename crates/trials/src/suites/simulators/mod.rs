@@ -12,8 +12,8 @@ pub mod readers;
 mod sessions;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::Result;
+use trepan_evidence::suite::{Findings, Gate, Row};
 
 /// Length of the long session, minutes.
 const LONG_MIN: f64 = 30.0;

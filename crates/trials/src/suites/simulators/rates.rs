@@ -3,7 +3,7 @@
 use super::bench::Bench;
 use super::case::CaseFixture;
 use super::hands::deep;
-use crate::engine::suite::{Findings, Gate, Row};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_haptics::script::Script;
 use trepan_haptics::simulated::HandModel;
 use trepan_link::wire::TickRecord;

@@ -2,10 +2,10 @@
 //! Python environment.
 
 use super::sessions;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::python::Workshop;
 use crate::suites::{Part, Scope};
 use std::time::{Duration, Instant};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_link::Recording;
 
 /// What is fetched.

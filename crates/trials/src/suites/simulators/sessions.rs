@@ -2,7 +2,6 @@
 //! half an hour of it.
 
 use super::case;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use anyhow::Result;
 use clap::Parser;
@@ -10,6 +9,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_simulator::{Options, Program, Session, Summary};
 
 /// Memory that a session may come to hold in half an hour, MB.

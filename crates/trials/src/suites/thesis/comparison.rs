@@ -11,7 +11,7 @@
 //! Where ours has no such quantity, the thesis's method of this run stands for it: then the verdict
 //! says whether the printed result comes out again.
 
-use crate::engine::suite::{Row, shown};
+use trepan_evidence::suite::{Row, shown};
 
 /// Ratio within which two values are the same.
 const SAME: f64 = 0.1;

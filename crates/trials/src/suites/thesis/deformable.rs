@@ -19,8 +19,6 @@
 
 use super::comparison::{Comparison, Rule};
 use super::rigid::{SHARES, axis, changes, lines, most, turn_deg};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::deformable::published::MODELS;
 use crate::suites::deformable::recording::{NAMES as PATH_FILES, TETS, path};
 use crate::suites::deformable::scene::{PATHS, RADIUS_MM, Scene};
@@ -29,6 +27,8 @@ use std::time::Instant;
 use trepan_contact::{ForceModel, Viscoelastic};
 use trepan_deformable::rivals::thesis;
 use trepan_deformable::{Config, Method, Response, TissueCollision, TissueStep};
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile};
 
 /// Limit of a frame, µs.

@@ -17,8 +17,6 @@
 //! Thesis, 5.4, Eq 5.9.
 
 use super::comparison::{Comparison, Rule};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::voxel_size::pass::HashedGrid;
 use crate::suites::voxel_size::scene::{Body, Elements, Scene, Touch, mesh};
 use crate::suites::voxel_size::timing::Calibration;
@@ -28,6 +26,8 @@ use glam::DVec3;
 use std::time::Instant;
 use trepan_contact::{NodalContacts, PlaneContact};
 use trepan_deformable::MeshCollision;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::{Aabb, Vec3, units};
 use trepan_mesh::TetMesh;
 use trepan_soft::{Body as SoftBody, Loads, Material, SoftSolver};

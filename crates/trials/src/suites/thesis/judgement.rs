@@ -2,9 +2,9 @@
 
 use super::comparison::{Comparison, Ratio, Verdict, cell};
 use super::items::{ITEMS, Item};
-use crate::engine::picture::Table;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::{Findings, Gate, Row};
 
 /// Least share of the numbered figures and tables with a counterpart, %: this project's goal.
 const LEAST_PERCENT: f64 = 90.0;
@@ -151,7 +151,7 @@ impl<'a> Counterpart<'a> {
 mod tests {
     use super::super::comparison::Rule;
     use super::*;
-    use crate::engine::picture::{Series, Snapshot};
+    use trepan_evidence::picture::{Series, Snapshot};
 
     #[test]
     fn only_what_a_run_made_is_a_counterpart() {

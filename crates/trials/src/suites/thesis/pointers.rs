@@ -6,10 +6,10 @@
 
 use super::comparison::{Comparison, Rule};
 use super::judgement::FOUND;
-use crate::engine::suite::{Findings, Row};
 use crate::suites::Part;
 use crate::suites::rigid::solid::RADIUS_MM;
 use std::path::Path;
+use trepan_evidence::suite::{Findings, Row};
 use trepan_geometry::{Pointshell, Spread, Vec3};
 
 /// A box of a drawing, and the item of the sources that does it.

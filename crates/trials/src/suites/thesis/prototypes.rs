@@ -8,15 +8,15 @@
 use super::comparison::{Comparison, Rule};
 use super::deformable::DEVICE_N;
 use super::rigid::{axis, changes, lines, most};
-use crate::engine::picture::{Series, Snapshot};
-use crate::engine::suite::Findings;
-use crate::engine::timer::Samples;
 use crate::suites::deformable::recording::TETS;
 use crate::suites::render::scenes;
 use crate::suites::scripted::{Prepared, Ride, Shown};
 use crate::suites::{Part, Scope};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use trepan_evidence::picture::{Series, Snapshot};
+use trepan_evidence::suite::Findings;
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Vec3, units};
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData, SliceLook};

@@ -6,8 +6,6 @@
 //! that drills gets the bone whole again. The paths are those of the suite `rigid`.
 
 use super::comparison::{Comparison, Rule};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::rigid::bones::{SKULLS, cube, head, skull};
 use crate::suites::rigid::models::CUBES;
 use crate::suites::rigid::recording::{Place, Task, path};
@@ -16,6 +14,8 @@ use crate::suites::{Part, Scope};
 use std::time::Instant;
 use trepan_bone::BoneVolume;
 use trepan_contact::{ForceModel, Viscoelastic};
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::{Buttons, Pointshell, Spread, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::rivals::{Ball, Sweep, thesis};
 use trepan_rigid::{Method, RigidStep};

@@ -18,11 +18,11 @@
 
 use super::Scope;
 use super::outside::{Shape, Size};
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use anyhow::{Context, Result};
 use trepan_contact::NodalContacts;
 use trepan_deformable::{TissueCollision, TissueStep};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Twist, Vec3, quantile};
 use trepan_mesh::{TetMesh, lattice};
 use trepan_simulator::Ingredients;

@@ -15,10 +15,10 @@
 
 use super::Scope;
 use super::outside::press_to_rest;
-use crate::engine::picture::Series;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::simulators::case;
 use anyhow::{Context, Result};
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_mesh::lattice::{Config, Domain, LabelledMesh};
 use trepan_simulator::measure::tissue::{Fineness, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes};

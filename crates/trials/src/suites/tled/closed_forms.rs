@@ -6,7 +6,7 @@
 //! neo-Hookean and Mooney-Rivlin tissue, `μ γ + (λ/2 + μ) γ³` for St. Venant-Kirchhoff's; Ogden's
 //! has the principal stretches `r, 1/r` with `r - 1/r = γ` and `(τ_r - τ_1/r)/(r + 1/r)`.
 
-use crate::engine::suite::{Findings, Gate, Row};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Tled};

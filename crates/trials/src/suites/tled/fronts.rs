@@ -8,9 +8,9 @@
 //! time.
 
 use super::{Part, Scope};
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::rivals::reference::{self, Order, Reference};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};

@@ -17,12 +17,12 @@
 //! beside it.
 
 use super::{Part, Scope};
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use glam::DVec3;
 use std::f32::consts::TAU;
 use std::time::Instant;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::TetMesh;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};

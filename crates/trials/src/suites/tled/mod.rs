@@ -15,7 +15,7 @@ mod speed;
 pub(super) mod stability;
 
 use super::{Part, Scope, card};
-use crate::engine::suite::Findings;
+use trepan_evidence::suite::Findings;
 
 /// Every scene.
 pub fn parts(scope: Scope) -> Vec<Part> {

@@ -2,8 +2,8 @@
 //! relaxation finds.
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use glam::DMat3;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::TetMesh;
 use trepan_soft::rivals::reference::{self, Reference};

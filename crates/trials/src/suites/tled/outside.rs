@@ -20,11 +20,11 @@
 //! apart two meshes of the truth are along the normal and sideways.
 
 use super::Scope;
-use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Part;
 use anyhow::{Context, Result};
 use serde::Deserialize;
 use trepan_contact::NodalContacts;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_mesh::{TetMesh, lattice};
 use trepan_simulator::measure::tissue::{Fineness, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes};

@@ -4,9 +4,9 @@
 //! The papers named. Times of before: least of five quick runs, rivals in f64, one element at a
 //! time.
 
-use crate::engine::picture::Table;
-use crate::engine::suite::Row;
 use crate::suites::claims::{Claim, Former, Scale, Test, as_published, before_and_now};
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::Row;
 
 const ERROR: &str = "displacement_error_percent";
 const BLOCK: Scale =

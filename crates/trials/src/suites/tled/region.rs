@@ -8,10 +8,10 @@
 //! changes.
 
 use super::Scope;
-use crate::engine::picture::{Chart, Mark};
-use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_contact::NodalContact;
+use trepan_evidence::picture::{Chart, Mark};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};

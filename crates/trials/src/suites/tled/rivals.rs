@@ -7,10 +7,10 @@
 //! shakes or leaves numbers that are none.
 
 use super::stability::{cube, offset};
-use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate};
 use crate::suites::conditions;
 use trepan_contact::NodalContact;
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::suite::{Findings, Gate};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};

@@ -6,7 +6,7 @@
 //! are of the order `(r/L)²`. I and A are those of the mesh, whose section is a polygon.
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::rivals::reference::{self, Order, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};

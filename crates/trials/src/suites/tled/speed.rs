@@ -2,10 +2,10 @@
 //! threads than free cores.
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
-use crate::engine::timer::Samples;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_evidence::timer::Samples;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Kernel, Relaxation, Tled};

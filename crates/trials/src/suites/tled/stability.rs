@@ -2,9 +2,9 @@
 //! there.
 
 use super::{Part, Scope};
-use crate::engine::picture::{Map, Outcome};
-use crate::engine::suite::{Findings, Gate, Row};
 use trepan_contact::NodalContact;
+use trepan_evidence::picture::{Map, Outcome};
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Relaxation, Settling, Tled};

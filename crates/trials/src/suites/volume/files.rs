@@ -3,11 +3,11 @@
 
 use super::super::Scope;
 use super::data_folder;
-use crate::engine::suite::{Findings, Gate, Row};
 use glam::{DAffine3, DMat3, DVec3};
 use serde_json::Value;
 use std::path::Path;
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_volume::{VoxelVolume, read};
 
 /// A file or folder, voxels, edges in mm, axes, lowest and highest value.

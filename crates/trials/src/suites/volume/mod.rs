@@ -7,8 +7,8 @@ mod moves;
 mod registration;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_fixtures::case_head;
 use trepan_geometry::{Vec3, quantile};
 use trepan_volume::{

@@ -2,11 +2,11 @@
 
 use super::registration::{moved_by, scanned_again};
 use super::{image, quantile};
-use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate};
 use crate::suites::Scope;
 use crate::suites::conditions;
 use glam::{DAffine3, DQuat, DVec3};
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::suite::{Findings, Gate};
 use trepan_fixtures::case_head;
 use trepan_volume::{RegistrationConfig, VoxelVolume, register};
 

@@ -2,9 +2,9 @@
 
 use super::super::Scope;
 use super::{data_folder, image, quantile};
-use crate::engine::suite::{Findings, Gate, Row};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use std::time::Instant;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_fixtures::case_head;
 use trepan_volume::{Grid, Interpolation, RegistrationConfig, VoxelVolume, register, resample};
 

@@ -15,10 +15,10 @@ pub(super) mod scene;
 pub(super) mod timing;
 
 use super::{Part, Scope};
-use crate::engine::suite::{Findings, Gate, Row};
 use scene::{Body, Elements, Scene, Touch};
 use std::time::Instant;
 use timing::Calibration;
+use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Aabb, quantile};
 use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
 

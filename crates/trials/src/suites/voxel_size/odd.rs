@@ -2,9 +2,9 @@
 //! can be built, and whether it is near the best.
 
 use super::{OURS, RULES, edge_of_512_voxels, timing};
-use crate::engine::picture::Outcome;
-use crate::engine::suite::{Findings, Gate};
 use crate::suites::conditions;
+use trepan_evidence::picture::Outcome;
+use trepan_evidence::suite::{Findings, Gate};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
 

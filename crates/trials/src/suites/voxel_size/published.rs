@@ -4,9 +4,9 @@
 //! Thesis 5.3 and its Tables 5.2 and 5.3; Teschner et al. 2003, section on cell size; Garcia-Alonso
 //! et al. 1994, as the thesis quotes it (5.1).
 
-use crate::engine::picture::Table;
-use crate::engine::suite::{Row, shown};
 use crate::suites::claims::{Claim, Test, as_published, median};
+use trepan_evidence::picture::Table;
+use trepan_evidence::suite::{Row, shown};
 
 const REGRET: &str = "regret_percent";
 /// What a good size may lose, percent: the zone of the thesis.

@@ -1,8 +1,8 @@
 //! Fault cases of the libdrd driver.
 
 use super::{Bench, Case, Felt, Loop, Then, refused, row, run};
-use crate::engine::suite::Row;
 use trepan_emulators::{Library, drd};
+use trepan_evidence::suite::Row;
 use trepan_haptics::force_dimension::{Config, ForceDimension};
 use trepan_haptics::{DeviceError, Fault};
 

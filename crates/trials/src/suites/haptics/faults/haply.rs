@@ -1,10 +1,10 @@
 //! Fault cases of the driver of Haply's service, in real time.
 
 use super::{Bench, Case, Course, Felt, Loop, Scope, Then, refused, row, run};
-use crate::engine::suite::Row;
 use std::thread;
 use std::time::{Duration, Instant};
 use trepan_emulators::service::{Behaviour, Service};
+use trepan_evidence::suite::Row;
 use trepan_haptics::haply::{Config, Haply};
 use trepan_haptics::{DeviceError, Fault};
 

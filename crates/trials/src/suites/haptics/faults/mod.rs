@@ -14,10 +14,10 @@ mod haply;
 mod openhaptics;
 
 use super::Scope;
-use crate::engine::suite::{Gate, Row};
 use std::path::Path;
 use std::time::Instant;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+use trepan_evidence::suite::{Gate, Row};
 use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_haptics::{DeviceError, Fault, HapticDevice, Status};
 

@@ -1,8 +1,8 @@
 //! Fault cases of the libHD driver.
 
 use super::{Bench, Case, Felt, Loop, Then, refused, row, run};
-use crate::engine::suite::Row;
 use trepan_emulators::{Library, hd};
+use trepan_evidence::suite::Row;
 use trepan_haptics::openhaptics::{Config, OpenHaptics};
 use trepan_haptics::{DeviceError, Fault, HapticDevice};
 

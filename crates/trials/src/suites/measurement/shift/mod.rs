@@ -5,9 +5,9 @@ mod opened;
 mod retraction;
 mod sag;
 
-use crate::engine::suite::Findings;
 use crate::suites::{Part, Scope};
 use anyhow::Result;
+use trepan_evidence::suite::Findings;
 
 /// Lists the parts.
 pub fn parts(_: Scope) -> Vec<Part> {

@@ -1,10 +1,10 @@
 //! The brain with the dura open: shift against time, and the swing of pulse and breathing.
 
 use super::head::{Head, Still};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::measurement::comparison::{Comparison, How};
 use anyhow::Result;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_measurements::{Row, pulse, shift, support};
 use trepan_simulator::{Phase, Settling};
 use trepan_soft::Loads;

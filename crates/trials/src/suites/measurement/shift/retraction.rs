@@ -1,11 +1,11 @@
 //! A blade that holds the brain aside: its pressure against time.
 
 use super::head::{Head, Still};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::measurement::comparison::{Comparison, How};
 use anyhow::Result;
 use trepan_contact::PlaneContact;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_measurements::{pulse, retraction};
 
 /// When the pressure is read, minutes after the blade was set.

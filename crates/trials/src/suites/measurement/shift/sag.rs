@@ -1,11 +1,11 @@
 //! The brain in the closed skull when the head is turned: it floats, but weighs a thirtieth.
 
 use super::head::{Head, Still};
-use crate::engine::picture::Series;
-use crate::engine::suite::Findings;
 use crate::suites::measurement::comparison::{Comparison, How};
 use anyhow::Result;
 use glam::Vec3;
+use trepan_evidence::picture::Series;
+use trepan_evidence::suite::Findings;
 use trepan_geometry::units::GRAVITY_MM_PER_MS2;
 use trepan_measurements::sag;
 use trepan_soft::Loads;
