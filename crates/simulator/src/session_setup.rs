@@ -199,12 +199,14 @@ impl SessionSetup {
     }
 }
 
-/// Contact of tool and tissue; a grid's cells are the cheapest for the mesh.
+/// Contact of tool and tissue; a rival's grid has the cells that are the cheapest for the mesh.
 fn touch(mesh: &TetMesh, with: &Ingredients) -> Result<trepan_deformable::Config, SessionError> {
-    let cell_mm = Measures::of(mesh).and_then(|measures| CostModel::default().analytic(&measures));
+    let cheapest = || Measures::of(mesh).and_then(|measures| CostModel::default().analytic(&measures));
+    let is_rival = with.search != trepan_deformable::Method::RECOMMENDED;
+    let cell_mm = is_rival.then(cheapest).transpose().map_err(|fault| brain_error(&fault))?;
     Ok(trepan_deformable::Config {
         method: with.search,
-        cell_mm: Some(cell_mm.map_err(|fault| brain_error(&fault))? as f32),
+        cell_mm: cell_mm.map(|mm| mm as f32),
         friction: with.friction,
         ..trepan_deformable::Config::default()
     })

@@ -15,6 +15,7 @@ use crate::measure::Parts;
 use crate::operation::Operation;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
 
@@ -69,11 +70,16 @@ impl SessionConfig {
     /// # Errors
     /// If an entry is not a value of its field.
     pub fn of(header: &SessionHeader) -> Result<Self, SessionError> {
-        let mut value = to_value(&Self::default());
-        for (path, text) in old_header::renamed(&header.config) {
-            fill(&mut value, &path, &text);
-        }
-        let read = serde_json::from_value::<Self>(value).map_err(|fault| fault.to_string());
+        let entries = old_header::renamed(&header.config);
+        let filled = |entries: &mut dyn Iterator<Item = (&Cow<'_, str>, &Cow<'_, str>)>| {
+            let mut value = to_value(&Self::default());
+            entries.for_each(|(path, text)| fill(&mut value, path, text));
+            serde_json::from_value::<Self>(value)
+        };
+        let read = filled(&mut entries.iter()).map_err(|fault| {
+            let alone = entries.iter().find(|entry| filled(&mut [*entry].into_iter()).is_err());
+            format!("{}: {fault}", alone.map_or("", |(path, _)| path))
+        });
         let read = read.and_then(|config| config.operation.check().map(|()| config));
         read.map_err(|fault| {
             SessionError::Usage(format!("the recording's header cannot be read: {fault}; its session cannot run again"))
@@ -181,7 +187,7 @@ mod tests {
         assert_eq!(read(unknown).unwrap(), SessionConfig::default());
         for (path, text) in [("operation.rate_hz", "0"), ("operation.flap_mm", "wide"), ("sizes.tets", "-1")] {
             let fault = read(BTreeMap::from([(path.into(), text.into())])).unwrap_err().to_string();
-            assert!(fault.contains("header cannot be read") && fault.contains(text), "{fault}");
+            assert!(fault.contains("header cannot be read") && fault.contains(text) && fault.contains(path), "{fault}");
         }
     }
 }
