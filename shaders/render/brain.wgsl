@@ -14,7 +14,7 @@ struct Corner {
     @location(2) rest: vec3f,
 }
 
-struct Seen {
+struct SurfacePoint {
     @location(0) hit: vec4u,
     @location(1) rest: vec4u,
 }
@@ -25,8 +25,8 @@ struct Seen {
     return Corner(scene.clip_from_world * vec4f(place, 1.0), place, normals[v].xyz, rest[v].xyz);
 }
 
-@fragment fn fragment(v: Corner) -> Seen {
+@fragment fn fragment(v: Corner) -> SurfacePoint {
     if height(scene.brain_cut, v.place) > 0.0 { discard; }
     let hit = vec4f(fold(normalize(v.normal)), 0.0, distance(v.place, scene.eye.xyz));
-    return Seen(packed(hit), packed(vec4f(v.rest, 1.0)));
+    return SurfacePoint(packed(hit), packed(vec4f(v.rest, 1.0)));
 }

@@ -11,7 +11,7 @@ struct Vertex {
     @location(1) rest: vec3f,
 }
 
-struct Seen {
+struct SurfacePoint {
     @location(0) hit: vec4u,
     @location(1) rest: vec4u,
 }
@@ -21,7 +21,7 @@ struct Seen {
     return Vertex(scene.clip_from_world * vec4f(corner.place.xyz, 1.0), corner.place.xyz, corner.rest.xyz);
 }
 
-@fragment fn fragment(v: Vertex) -> Seen {
+@fragment fn fragment(v: Vertex) -> SurfacePoint {
     let hit = vec4f(fold(scene.brain_cut.xyz), 1.0, distance(v.place, scene.eye.xyz));
-    return Seen(packed(hit), packed(vec4f(v.rest, 1.0)));
+    return SurfacePoint(packed(hit), packed(vec4f(v.rest, 1.0)));
 }

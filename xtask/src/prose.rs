@@ -10,9 +10,16 @@ const OLD: &str = "version 0.1";
 /// Words that are not used any more, and what is used instead: `OLD -> NEW`, a line each.
 const RETIRED: &str = include_str!("retired_words.txt");
 
+/// Participles, which say what happened to a thing and not what it is.
+const PARTICIPLES: [&str; 24] = [
+    "Asked", "Built", "Crossed", "Drawn", "Ended", "Felt", "Flown", "Garbled", "Held", "Kept", "Lent", "Looked", "Met",
+    "Opened", "Paid", "Ran", "Seen", "Shown", "Stored", "Taken", "Taught", "Told", "Worn", "Wanted",
+];
+
 /// Faults of a source file in Rust or WGSL, each with its line.
 pub fn in_source(text: &str) -> Vec<String> {
     let mut faults = retired(text);
+    faults.extend(text.lines().enumerate().filter_map(|(at, line)| participle(at, line)));
     let comments = text.lines().enumerate().filter(|(_, line)| line.trim_start().starts_with("//"));
     faults.extend(comments.filter_map(|(at, line)| too_wide(at, line)));
     faults.extend(first_sentences(text));
@@ -31,6 +38,17 @@ pub fn in_markdown(text: &str) -> Vec<String> {
         }
     }
     faults
+}
+
+/// A type that is named by a participle alone.
+fn participle(at: usize, line: &str) -> Option<String> {
+    let keyword = ["struct ", "enum ", "trait ", "type "].into_iter();
+    let name = keyword.filter_map(|keyword| line.split_once(keyword)).find(|(before, _)| {
+        let before = before.trim();
+        before.is_empty() || before.starts_with("pub")
+    });
+    let name = name?.1.split(|c: char| !c.is_alphanumeric()).next()?;
+    PARTICIPLES.contains(&name).then(|| format!("{}: `{name}` is a participle, name the thing", at + 1))
 }
 
 /// A line that is too wide, unless it is one long word such as an address.
@@ -115,6 +133,16 @@ mod tests {
         assert!(pairs.clone().all(|word| in_markdown(&format!("Use `{word}`.")).len() == 1));
         assert!(pairs.clone().all(|word| in_source(&format!("    \"{word}\" => 1, // of {OLD}\n")).is_empty()));
         assert!(pairs.all(|word| in_markdown(&format!("Neither a{word} nor {word}_b is on the list.")).is_empty()));
+    }
+
+    #[test]
+    fn a_type_that_is_named_by_a_participle_is_found() {
+        for line in ["pub struct Held {", "    enum Shown<'a> {", "pub(crate) type Asked = u8;"] {
+            assert_eq!(in_source(line).len(), 1, "{line}");
+        }
+        for line in ["struct HeldTool;", "let x = Kept;", "    Drawn,", "impl Held {"] {
+            assert!(in_source(line).is_empty(), "{line}");
+        }
     }
 
     #[test]

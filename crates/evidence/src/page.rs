@@ -21,8 +21,8 @@ struct Section<'a> {
     broken: usize,
     /// Command that runs one part alone.
     command_of_part: String,
-    charts: Vec<Drawn>,
-    series: Vec<Drawn>,
+    charts: Vec<DrawnChart>,
+    series: Vec<DrawnChart>,
     maps: Vec<Figure<'a>>,
     /// Number of map cells that work, degrade, fail and are refused.
     grades: [usize; 4],
@@ -32,12 +32,12 @@ struct Section<'a> {
 
 /// A chart, or why there is none.
 #[derive(Serialize)]
-struct Drawn {
+struct DrawnChart {
     svg: Option<String>,
     fault: Option<String>,
 }
 
-impl Drawn {
+impl DrawnChart {
     fn of<E: std::fmt::Display>(svg: Result<String, E>) -> Self {
         Self { fault: svg.as_ref().err().map(E::to_string), svg: svg.ok() }
     }
@@ -73,7 +73,7 @@ impl<'a> Section<'a> {
             broken: found.gates.iter().filter(|gate| gate.breaks()).count(),
             command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
             charts: charts(suite, report),
-            series: found.series.iter().map(|series| Drawn::of(curve::svg(series))).collect(),
+            series: found.series.iter().map(|series| DrawnChart::of(curve::svg(series))).collect(),
             maps: found.maps.iter().map(Figure::of).collect(),
             grades,
             tables: found.rows.chunk_by(|a, b| a.metrics.keys().eq(b.metrics.keys())).collect(),
@@ -82,7 +82,7 @@ impl<'a> Section<'a> {
     }
 }
 
-fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
+fn charts(suite: &Suite, report: &Report) -> Vec<DrawnChart> {
     let own = &report.findings.charts;
     let needed = own.is_empty() && report.findings.series.is_empty();
     let drawn = if needed { vec![chart_of_all(suite, report)] } else { own.clone() };
@@ -93,7 +93,7 @@ fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
         }
     }
     let draw = |chart: &Chart| {
-        Drawn::of(match chart.marks.is_empty() {
+        DrawnChart::of(match chart.marks.is_empty() {
             true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
             false => plot::svg(chart, &methods).map_err(|fault| fault.to_string()),
         })

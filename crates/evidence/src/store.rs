@@ -27,7 +27,7 @@ const PARTS: &str = "parts";
 
 /// Content of one part's file.
 #[derive(Serialize, Deserialize)]
-pub struct Stored {
+pub struct StoredPart {
     /// Hash of the program that made the part.
     program: String,
     /// Run time, s.
@@ -67,19 +67,19 @@ impl Store {
     }
 
     /// Finished part that this program made in this scope, if stored.
-    pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
+    pub fn found(&self, suite: &str, part: &str) -> Option<StoredPart> {
         self.own(suite, part).filter(|stored| stored.ended)
     }
 
     /// Part that this program made in this scope, finished or not.
-    fn own(&self, suite: &str, part: &str) -> Option<Stored> {
-        let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
+    fn own(&self, suite: &str, part: &str) -> Option<StoredPart> {
+        let stored: StoredPart = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
         (stored.program == self.program && stored.making.scope() == self.making.scope()).then_some(stored)
     }
 
     /// Parts of a suite that this program made in this scope: name, file and part. Nothing
     /// else in the folder is read.
-    fn all_own(&self, suite: &Suite) -> impl Iterator<Item = (String, PathBuf, Stored)> {
+    fn all_own(&self, suite: &Suite) -> impl Iterator<Item = (String, PathBuf, StoredPart)> {
         let names = slugs(suite, self.making.scope()).into_iter();
         names.filter_map(|name| Some((name.clone(), self.place(suite.name, &name), self.own(suite.name, &name)?)))
     }
@@ -98,7 +98,7 @@ impl Store {
         (findings, ended): (Findings, bool),
     ) -> Result<()> {
         let (program, making) = (self.program.clone(), self.making.clone());
-        let stored = Stored { program, seconds, ended, control, making, findings };
+        let stored = StoredPart { program, seconds, ended, control, making, findings };
         whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
     }
 
@@ -133,7 +133,7 @@ pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
 
 /// Parts of a suite in some folders: name, file and part. Temporary files of interrupted writes are
 /// skipped.
-fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (String, PathBuf, Stored)>> {
+fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (String, PathBuf, StoredPart)>> {
     let mut all = Vec::new();
     for folder in folders {
         for entry in fs::read_dir(folder.join(PARTS).join(suite)).into_iter().flatten() {
@@ -151,15 +151,15 @@ fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (Stri
 }
 
 /// Combines and judges parts of one suite as one run.
-fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -> Result<Option<Report>> {
-    let mut parts: BTreeMap<String, (PathBuf, Stored)> = BTreeMap::new();
+fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, StoredPart)>) -> Result<Option<Report>> {
+    let mut parts: BTreeMap<String, (PathBuf, StoredPart)> = BTreeMap::new();
     for (name, path, part) in all {
         if let Some((other, _)) = parts.insert(name, (path.clone(), part)) {
             bail!("{} and {} are the same part: leave one out", other.display(), path.display());
         }
     }
     let Some((first, of_first)) = parts.values().next() else { return Ok(None) };
-    let alike = |one: &Stored, two: &Stored| {
+    let alike = |one: &StoredPart, two: &StoredPart| {
         let [one_commit, two_commit] = [one, two].map(|part| &*part.making.commit);
         // Uncommitted changes, and sources without a commit, cannot be checked for equality.
         let is_sure = !one_commit.ends_with("-dirty") && one_commit != "unknown";
@@ -190,8 +190,8 @@ fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -
 }
 
 /// Table of the control beside each part: how long the part took, and how busy the machine was.
-fn beside<'a>(parts: impl Iterator<Item = (&'a String, &'a Stored)>) -> Table {
-    let row = |(name, part): (&String, &Stored)| {
+fn beside<'a>(parts: impl Iterator<Item = (&'a String, &'a StoredPart)>) -> Table {
+    let row = |(name, part): (&String, &StoredPart)| {
         let Control { empty_p99_us, sum_p50_us, sum_p99_us, load } = part.control;
         let numbers = [part.seconds, load, empty_p99_us, sum_p50_us, sum_p99_us];
         std::iter::once(name.clone()).chain(numbers.map(|number| format!("{number:.2}"))).collect()
@@ -306,7 +306,7 @@ mod tests {
         let merged_of = |programs: [&str; 2], commit: &str| {
             for n in 0..5 {
                 let path = all.path().join(format!("parts/made-up/part-{n}.json"));
-                let mut part: Stored = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+                let mut part: StoredPart = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
                 part.program = programs[n % 2].into();
                 part.making.commit = commit.into();
                 whole(&path, &serde_json::to_vec(&part).unwrap()).unwrap();

@@ -30,7 +30,7 @@ pub struct Descriptor {
     /// it. Opens none: that could move it.
     pub probe: fn() -> Result<Vec<Listed>, DeviceError>,
     /// Opens the device of an argument with the recommended settings.
-    pub open: fn(Option<&str>, &Setting<'_>) -> Result<Opened, DeviceError>,
+    pub open: fn(Option<&str>, &Setting<'_>) -> Result<OpenedDevice, DeviceError>,
 }
 
 /// Where a device's motion comes from.
@@ -55,7 +55,7 @@ pub struct Setting<'a> {
 }
 
 /// An open device and its other ends.
-pub struct Opened {
+pub struct OpenedDevice {
     /// The device, for the haptic loop.
     pub device: Box<dyn HapticDevice>,
     /// Its faults, for the code that shows messages, if it can have any.
@@ -64,7 +64,7 @@ pub struct Opened {
     pub pointer: Option<MouseHandle>,
 }
 
-impl Opened {
+impl OpenedDevice {
     /// A device without faults.
     pub fn new(device: impl HapticDevice + 'static) -> Self {
         Self { device: Box::new(device), watch: None, pointer: None }
@@ -145,7 +145,7 @@ impl DeviceName {
     }
 
     /// Opens the device with the recommended settings.
-    pub fn open(&self, setting: &Setting<'_>) -> Result<Opened, DeviceError> {
+    pub fn open(&self, setting: &Setting<'_>) -> Result<OpenedDevice, DeviceError> {
         (self.kind.open)(self.argument.as_deref(), setting)
     }
 }

@@ -29,7 +29,7 @@ pub enum Fault {
     /// The vendor's service does not answer.
     ServiceSilent = 8,
     /// The device or its service sends invalid data.
-    Garbled = 9,
+    InvalidMessage = 9,
     /// The device has no power.
     NoPower = 10,
     /// The device sends no new positions.
@@ -48,7 +48,7 @@ const ALL: [(Fault, &str); 12] = [
     (Fault::Braked, "the brakes are on: release the emergency stop, press the device's force button"),
     (Fault::LoopSilent, "the haptic loop was silent for 10 ms and the force was cut: close other programs"),
     (Fault::ServiceSilent, "the vendor's service does not answer: see whether it runs, then start again"),
-    (Fault::Garbled, "the device sends invalid data: update its driver or its service"),
+    (Fault::InvalidMessage, "the device sends invalid data: update its driver or its service"),
     (Fault::NoPower, "the device has no power: plug in its power supply"),
     (Fault::Stale, "the device sends no new positions: close other programs, check its cable"),
     (Fault::Stopped, "the maker's software stopped serving the device: close other programs, then start again"),

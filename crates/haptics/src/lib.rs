@@ -37,7 +37,7 @@ mod threaded;
 mod workspace;
 
 pub use clutch::Clutch;
-pub use descriptor::{Descriptor, DeviceName, Listed, Motion, NameError, Opened, Setting, no_argument};
+pub use descriptor::{Descriptor, DeviceName, Listed, Motion, NameError, OpenedDevice, Setting, no_argument};
 pub use device::{Capabilities, HapticDevice, Reading, Status};
 pub use error::DeviceError;
 pub use fault::{Fault, Watch};

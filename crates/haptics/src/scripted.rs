@@ -1,6 +1,6 @@
 //! The devices of a program without hardware: the window's pointer and a scripted operation.
 
-use crate::descriptor::{Descriptor, Listed, Motion, NameError, Opened, no_argument};
+use crate::descriptor::{Descriptor, Listed, Motion, NameError, OpenedDevice, no_argument};
 use crate::{mouse, script};
 
 /// `mouse`: follows the window's pointer from where the program's operation begins.
@@ -14,7 +14,7 @@ pub(crate) static MOUSE: Descriptor = Descriptor {
     probe: || Ok(vec![Listed::new("mouse", "ready where there is a window")]),
     open: |_, setting| {
         let (pointer, mouse) = mouse::pair((setting.script)(None)?.at(0.0).world_from_tool);
-        Ok(Opened { pointer: Some(pointer), ..Opened::new(mouse) })
+        Ok(OpenedDevice { pointer: Some(pointer), ..OpenedDevice::new(mouse) })
     },
 };
 
@@ -27,7 +27,7 @@ pub(crate) static SCRIPT: Descriptor = Descriptor {
     argument: operation_name,
     id: |name| name,
     probe: || Ok(script::NAMES.map(|name| Listed::new(format!("script:{name}"), "ready")).into()),
-    open: |operation, setting| Ok(Opened::new((setting.script)(operation)?)),
+    open: |operation, setting| Ok(OpenedDevice::new((setting.script)(operation)?)),
 };
 
 /// The argument of a device that a script moves: one of [`script::NAMES`].

@@ -28,7 +28,7 @@
 
 use crate::script;
 use crate::scripted::operation_name;
-use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, Opened, Reading};
+use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, OpenedDevice, Reading};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_measurements::{devices, grip};
@@ -44,7 +44,7 @@ pub static DEVICE: Descriptor = Descriptor {
     probe: || Ok(script::NAMES.map(|name| Listed::new(format!("simulated:{name}"), "ready")).into()),
     open: |operation, setting| {
         let intent = Box::new((setting.script)(operation)?);
-        Ok(Opened::new(Simulated::new(Config::default(), HandModel::FIRM, intent)))
+        Ok(OpenedDevice::new(Simulated::new(Config::default(), HandModel::FIRM, intent)))
     },
 };
 

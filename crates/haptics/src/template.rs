@@ -35,8 +35,8 @@
 
 use crate::ramp::Ramp;
 use crate::{
-    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Motion, NameError, Opened, Reading, Status, Watch,
-    Workspace,
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Motion, NameError, OpenedDevice, Reading, Status,
+    Watch, Workspace,
 };
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
@@ -59,7 +59,7 @@ pub static DEVICE: Descriptor = Descriptor {
         let address = address.unwrap_or_default().parse::<SocketAddr>();
         let address = address.map_err(|fault| DeviceError::open(DEVICE.name, fault.to_string(), REMEDY))?;
         let config = Config { address, workspace: setting.workspace };
-        Template::open(&config).map(|device| Opened::watched(device.watch(), device))
+        Template::open(&config).map(|device| OpenedDevice::watched(device.watch(), device))
     },
 };
 
@@ -130,7 +130,7 @@ impl Template {
                         newest = Some(state);
                     }
                     Some(_) => {}
-                    None => self.ramp.cut(Fault::Garbled),
+                    None => self.ramp.cut(Fault::InvalidMessage),
                 },
                 Err(fault) if fault.kind() == ErrorKind::WouldBlock => break,
                 Err(fault) => return Err(fault),

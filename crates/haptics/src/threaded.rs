@@ -160,14 +160,14 @@ mod tests {
 
     /// The calls that the test device received, and its behaviour.
     #[derive(Default)]
-    struct Seen {
+    struct DeviceLog {
         force: Vec3,
         closed: u32,
         hangs: bool,
         panics: bool,
     }
 
-    struct Bench(Arc<Mutex<Seen>>);
+    struct Bench(Arc<Mutex<DeviceLog>>);
 
     impl HapticDevice for Bench {
         fn read(&mut self, time_ms: f64) -> Reading {
@@ -189,8 +189,8 @@ mod tests {
         }
     }
 
-    fn pair() -> (Arc<Mutex<Seen>>, ThreadedDevice) {
-        let seen = Arc::new(Mutex::new(Seen::default()));
+    fn pair() -> (Arc<Mutex<DeviceLog>>, ThreadedDevice) {
+        let seen = Arc::new(Mutex::new(DeviceLog::default()));
         (seen.clone(), ThreadedDevice::new(Box::new(Bench(seen))))
     }
 

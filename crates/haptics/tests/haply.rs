@@ -115,7 +115,7 @@ fn invalid_and_late_replies_cut_the_force_until_they_end() {
         run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
     };
     cut_and_back(|b| b.late_ms = 60, Fault::ServiceSilent);
-    cut_and_back(|b| b.garbage = Some("{\"inverse3\": [".to_owned()), Fault::Garbled);
+    cut_and_back(|b| b.garbage = Some("{\"inverse3\": [".to_owned()), Fault::InvalidMessage);
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn a_device_that_vanishes_or_a_service_that_hangs_up_is_lost() {
         (|b| b.unplugged = true, Fault::Disconnected),
         (|b| b.hang_up = true, Fault::Disconnected),
         (|b| b.mute = true, Fault::ServiceSilent),
-        (|b| b.garbage = Some("?".to_owned()), Fault::Garbled),
+        (|b| b.garbage = Some("?".to_owned()), Fault::InvalidMessage),
     ];
     for (misbehave, fault) in misbehaviours {
         let service = Service::start(Behaviour::default());

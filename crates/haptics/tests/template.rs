@@ -127,7 +127,7 @@ fn invalid_data_cut_the_force_and_old_states_are_skipped() {
     bench.run(400);
     bench.send(b"what?");
     bench.run(1);
-    assert_eq!((bench.told, bench.driver.watch().fault()), (Vec3::ZERO, Some(Fault::Garbled)));
+    assert_eq!((bench.told, bench.driver.watch().fault()), (Vec3::ZERO, Some(Fault::InvalidMessage)));
     let old = bench.state(1);
     bench.tick(false);
     bench.send(&old);

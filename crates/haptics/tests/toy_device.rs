@@ -3,8 +3,8 @@
 use trepan_geometry::{Pose, ToolState, Vec3};
 use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{
-    Capabilities, Descriptor, DeviceError, DeviceName, GuardedWrench, HapticDevice, Listed, Motion, NameError, Opened,
-    Reading, Setting, Status, Workspace,
+    Capabilities, Descriptor, DeviceError, DeviceName, GuardedWrench, HapticDevice, Listed, Motion, NameError,
+    OpenedDevice, Reading, Setting, Status, Workspace,
 };
 
 /// Rests at a height.
@@ -22,7 +22,7 @@ static TOY: Descriptor = Descriptor {
         let height_mm = height.unwrap_or("0").parse::<f32>();
         let height_mm = height_mm.map_err(|fault| DeviceError::open("toy", fault.to_string(), "give a number"))?;
         let pose = Pose::from_translation(Vec3::Z * height_mm);
-        Ok(Opened::new(Toy(setting.workspace.world(&ToolState::at(pose)))))
+        Ok(OpenedDevice::new(Toy(setting.workspace.world(&ToolState::at(pose)))))
     },
 };
 

@@ -48,7 +48,7 @@ pub(crate) struct Grid {
 
 /// Free distances from each brick.
 #[derive(Clone, Debug)]
-pub(crate) struct Leaps {
+pub(crate) struct SkipDistances {
     /// Bricks of cells along x, y, z.
     pub bricks: [usize; 3],
     /// Free distance per octant, at most 255; 0 where bone may be.
@@ -152,7 +152,7 @@ fn boxed(low: [usize; 3], high: [usize; 3], dims: [usize; 3]) -> Vec<[usize; 3]>
     rows.flat_map(|(y, z)| (low[0]..=high[0]).map(move |x| [x, y, z])).collect()
 }
 
-impl Leaps {
+impl SkipDistances {
     pub fn of(bone: Option<&BoneVolume>, grid: &Grid) -> Self {
         let bricks = grid.dims.map(|n| (n - 1).div_ceil(LEAP));
         let count = bricks.iter().product();
@@ -327,7 +327,7 @@ mod tests {
         BoneVolume::new(&volume, 400).unwrap()
     }
 
-    fn check(bone: &BoneVolume, leaps: &Leaps, exact: bool) {
+    fn check(bone: &BoneVolume, leaps: &SkipDistances, exact: bool) {
         let count = leaps.cells.len();
         let holds = |b: [usize; 3]| corners(b.map(|v| v * LEAP), LEAP + 1).any(|padded| bone.is_bone(padded - 1));
         let held: Vec<[usize; 3]> = (0..count).map(|at| leaps.place(at)).filter(|&b| holds(b)).collect();
@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn a_cell_has_its_bit_where_one_of_its_corners_is_bone() {
         let bone = bone_at([20, 20, 20], &[[7, 7, 7], [10, 9, 8]]);
-        let leaps = Leaps::of(Some(&bone), &Grid::of(Some(&bone)));
+        let leaps = SkipDistances::of(Some(&bone), &Grid::of(Some(&bone)));
         for brick in [[1, 1, 1], [2, 2, 2], [2, 2, 1], [0, 4, 4]] {
             for cell in 0..64 {
                 let low = [cell % 4, cell / 4 % 4, cell / 16];
@@ -364,7 +364,7 @@ mod tests {
     fn free_distances_reach_the_nearest_bone_and_stay_valid_while_it_changes() {
         let bone = bone_at([70, 40, 50], &[[3, 3, 2], [60, 20, 46]]);
         let grid = Grid::of(Some(&bone));
-        let mut leaps = Leaps::of(Some(&bone), &grid);
+        let mut leaps = SkipDistances::of(Some(&bone), &grid);
         check(&bone, &leaps, true);
         bone.set_hu(IVec3::new(60, 20, 46), AIR_HU);
         leaps.follow(&bone, &[[7, 2, 5]]);
@@ -379,7 +379,7 @@ mod tests {
     #[test]
     fn a_corner_shared_by_eight_bricks_marks_them_all() {
         let bone = bone_at([20, 20, 20], &[[7, 7, 7]]);
-        let leaps = Leaps::of(Some(&bone), &Grid::of(Some(&bone)));
+        let leaps = SkipDistances::of(Some(&bone), &Grid::of(Some(&bone)));
         assert_eq!(leaps.bricks, [6, 6, 6]);
         assert_eq!((0..216).filter(|&at| leaps.free(at) == 0).count(), 8);
         assert_eq!(Grid::of(Some(&bone)).share(&bone, [2, 2, 2]), 255 / 64);

@@ -10,7 +10,7 @@ use trepan_geometry::Aabb;
 
 /// The data that the processor needs to take over.
 #[derive(Clone, Debug)]
-pub(crate) struct Kept {
+pub(crate) struct SceneCache {
     pub bone: Option<Arc<BoneVolume>>,
     /// Box that the slices show.
     pub bounds: Aabb,
@@ -18,7 +18,7 @@ pub(crate) struct Kept {
     pub mri: Option<Arc<Signals>>,
 }
 
-impl Kept {
+impl SceneCache {
     pub fn of(data: &SceneData) -> Result<Self, RenderError> {
         let mri = data.mri.map(|mri| Signals::of(mri, data.tint)).transpose()?.map(Arc::new);
         Ok(Self { bone: data.bone.clone(), bounds: bounds(data), brain: data.brain.map(Border::of), mri })

@@ -10,7 +10,7 @@
 
 use crate::frame::{Frame, SceneData};
 use crate::image::Image;
-use crate::kept::Kept;
+use crate::kept::SceneCache;
 use crate::report::DrawReport;
 use crate::{Casting, ProcessorRenderer, RenderError, Renderer, View};
 use trepan_geometry::Aabb;
@@ -20,7 +20,7 @@ use trepan_gpu::{Gpu, GpuError, Prefer};
 #[derive(Debug)]
 pub struct Painter {
     by: By,
-    kept: Kept,
+    kept: SceneCache,
     notice: Option<String>,
     /// Whether rays are sparse, and the fraction of the 3-D view's pixels along an edge.
     quality: (bool, f32),
@@ -41,7 +41,7 @@ impl Painter {
 
     /// Loads a scene onto an open device, or onto the processor if opening failed.
     pub fn on(device: Result<Gpu, GpuError>, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
-        let kept = Kept::of(data)?;
+        let kept = SceneCache::of(data)?;
         let why = match device.map_err(RenderError::from).and_then(|gpu| Renderer::new(&gpu, data, size)) {
             Ok(renderer) => {
                 return Ok(Self { by: By::Device(Box::new(renderer)), kept, notice: None, quality: (false, 1.0) });
@@ -54,10 +54,10 @@ impl Painter {
 
     /// Loads a scene for rendering on the processor, ignoring devices.
     pub fn by_processor(data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
-        Self::processor(Kept::of(data)?, size)
+        Self::processor(SceneCache::of(data)?, size)
     }
 
-    fn processor(kept: Kept, size: [u32; 2]) -> Result<Self, RenderError> {
+    fn processor(kept: SceneCache, size: [u32; 2]) -> Result<Self, RenderError> {
         let processor = ProcessorRenderer::with(kept.clone(), size)?;
         Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: (false, 1.0) })
     }

@@ -48,7 +48,7 @@ pub(crate) struct Near {
 
 /// A disc and where a ball sees it.
 #[derive(Clone, Copy)]
-struct Seen {
+struct DiscView {
     disc: Disc,
     near: Near,
 }
@@ -56,9 +56,9 @@ struct Seen {
 /// The discs in reach of a ball.
 #[derive(Default)]
 pub(crate) struct InReach {
-    list: Vec<Seen>,
+    list: Vec<DiscView>,
     /// Those of them that may touch, seen from another place.
-    touched: Vec<Seen>,
+    touched: Vec<DiscView>,
     /// Where the ball sees them from.
     at: Vec3,
     /// Whether its centre is in bone there.
@@ -99,7 +99,7 @@ impl InReach {
     pub fn push(&mut self, ball: &Ball, disc: Disc) -> bool {
         let has_room = self.list.len() < self.list.capacity();
         if has_room {
-            self.list.push(Seen { near: ball.nearest(&disc, self.at), disc });
+            self.list.push(DiscView { near: ball.nearest(&disc, self.at), disc });
         }
         has_room
     }
@@ -162,7 +162,7 @@ impl Ball {
 
     /// Sees all of them with the ball at `centre`, eight at once: with the bits of
     /// [`nearest`](Self::nearest).
-    fn see(&self, all: &mut [Seen], centre: Vec3) {
+    fn see(&self, all: &mut [DiscView], centre: Vec3) {
         for eight in all.chunks_mut(8) {
             if self.inside || eight.iter().any(|seen| seen.disc.shaft) {
                 eight.iter_mut().for_each(|seen| seen.near = self.nearest(&seen.disc, centre));
@@ -172,7 +172,7 @@ impl Ball {
             let (rim, ahead) = Disc::ways_to(discs, centre);
             let (distance, share) = (rim.length(), 1.0 / ahead.length());
             let direction = ahead * share;
-            for (n, Seen { disc, near }) in eight.iter_mut().enumerate() {
+            for (n, DiscView { disc, near }) in eight.iter_mut().enumerate() {
                 let share = share.as_array()[n];
                 let direction = if share.is_finite() && share > 0.0 { direction.lane(n) } else { disc.normal };
                 *near = Near { distance: distance.as_array()[n], direction };
@@ -187,7 +187,7 @@ impl Ball {
         (all.at, all.inside) = (centre, self.inside);
         // Cheaper than the disc's own distance and never greater.
         let may = discs.iter().filter(|disc| disc.least_distance(centre) <= most + reach);
-        all.list.extend(may.map(|disc| Seen { disc: *disc, near: Near::default() }));
+        all.list.extend(may.map(|disc| DiscView { disc: *disc, near: Near::default() }));
         self.see(&mut all.list, centre);
         let smallest = all.list.iter().map(|seen| seen.near.distance).fold(f32::MAX, f32::min);
         all.list.retain(|seen| seen.near.distance <= most + reach);
@@ -285,9 +285,9 @@ mod tests {
             let mut discs: Vec<Disc> = discs.iter().enumerate().map(disc).collect();
             // One of them has the ball's centre in it.
             discs[0].centre = centre;
-            let mut all: Vec<Seen> = discs.iter().map(|disc| Seen { disc: *disc, near: Near::default() }).collect();
+            let mut all: Vec<DiscView> = discs.iter().map(|disc| DiscView { disc: *disc, near: Near::default() }).collect();
             ball.see(&mut all, centre);
-            for Seen { disc, near } in all {
+            for DiscView { disc, near } in all {
                 let one = ball.nearest(&disc, centre);
                 let bits = |near: Near| (near.distance.to_bits(), near.direction.to_array().map(f32::to_bits));
                 prop_assert_eq!(bits(near), bits(one));

@@ -1,7 +1,7 @@
 //! The cutting side of a tool: what it reaches, and what it takes by a law of removal.
 
 use crate::RigidStep;
-use crate::cut_ball::{BAND, Crossed, Paid, Side, Sweep, Taken, covered, depths, lanes};
+use crate::cut_ball::{BAND, CrossedDistances, PayableNodes, RemovedBone, Side, Sweep, covered, depths, lanes};
 use crate::nodes::{Nodes, clearance};
 use crate::removal::{Pressed, RemovalLaw};
 use crate::rows::{GridBall, rows};
@@ -90,7 +90,7 @@ struct Bite {
 
 /// A voxel that is worn by density.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Worn {
+pub(crate) struct WornVoxel {
     pub voxel: IVec3,
     /// Its share of the wear, in any unit.
     pub share: f32,
@@ -101,7 +101,7 @@ pub(crate) struct Worn {
 /// The cutting side of one tool.
 pub(crate) struct Burr {
     law: RemovalLaw,
-    paid: Paid,
+    paid: PayableNodes,
     bites: Vec<Bite>,
     limit: usize,
     /// Bone of the reference density that the load has earned and the burr has not cut, mm³.
@@ -131,7 +131,7 @@ impl Burr {
     pub fn new(law: RemovalLaw, limit: usize) -> Self {
         Self {
             law,
-            paid: Paid::with_capacity(limit),
+            paid: PayableNodes::with_capacity(limit),
             bites: Vec::with_capacity(limit),
             limit,
             earned_mm3: 0.0,
@@ -252,7 +252,7 @@ impl Burr {
                 Stop::Beyond => break (stop, most),
             }
         };
-        let Taken { cost: spent, volume } = self.paid.taken(radius, way);
+        let RemovedBone { cost: spent, volume } = self.paid.taken(radius, way);
         self.open(bone, &sweep, (hollow, way), nodes, out);
         (self.changed, self.has_opened) = (true, !self.opened.is_empty());
         if stop == Stop::At(way) && way > 0.0 {
@@ -281,7 +281,7 @@ impl Burr {
 
     /// Takes the density that the load of `cut` earns from voxels, in proportion to their shares.
     /// What is too little for a whole HU stays earned.
-    pub fn erode(&mut self, bone: &BoneVolume, cut: &Cut, worn: &[Worn], out: &mut RigidStep) {
+    pub fn erode(&mut self, bone: &BoneVolume, cut: &Cut, worn: &[WornVoxel], out: &mut RigidStep) {
         self.bites.clear();
         (self.paused, self.forward) = (0, (cut.device - cut.proxy).normalize_or_zero());
         let (earned, rpm) = self.law.turned(&cut.pressed(), &mut self.stalled);
@@ -298,7 +298,7 @@ impl Burr {
         let price = |hu: f32| self.law.price(hu.max(least));
         let cost_mm3 = |from: f32, loss: f32| whole * (price(from) - price(from - loss));
         let mut spent_mm3 = 0.0;
-        for &Worn { voxel, share, floor_hu } in worn.iter().take(self.limit) {
+        for &WornVoxel { voxel, share, floor_hu } in worn.iter().take(self.limit) {
             let hu = f32::from(bone.ct(voxel));
             let loss_hu = (self.earned_mm3 * share / (shares * cost_mm3(hu, 1.0).max(1e-9))).floor();
             let loss_hu = loss_hu.min((hu - floor_hu).floor());
@@ -336,7 +336,7 @@ impl Burr {
                 return;
             }
             let cosine = sweep.cosine(node, rise, (place.apart.sqrt(), steepness));
-            let crossed = Crossed { share, cosine };
+            let crossed = CrossedDistances { share, cosine };
             let gone = crossed.taken(covered(before, sweep.radius));
             for lane in lanes(taken) {
                 over |= paid.len() == *limit;

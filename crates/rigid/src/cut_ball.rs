@@ -201,14 +201,14 @@ pub(crate) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
 /// ```
 /// of it: d e is exact where they cross at right angles, the others where they are parallel.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Crossed {
+pub(crate) struct CrossedDistances {
     /// How much of a node is bone, d.
     pub share: f32x8,
     /// Cosine of the angle between the two normals, c.
     pub cosine: f32x8,
 }
 
-impl Crossed {
+impl CrossedDistances {
     /// How much of each node a burr takes that covers so much of it.
     #[inline]
     pub fn taken(&self, covered: f32x8) -> f32x8 {
@@ -222,10 +222,10 @@ impl Crossed {
 
 /// Nodes of bone that the burr may take some of, eight by eight.
 #[derive(Default)]
-pub(crate) struct Paid {
+pub(crate) struct PayableNodes {
     along: Vec<f32>,
     apart: Vec<f32>,
-    /// As in [`Crossed`].
+    /// As in [`CrossedDistances`].
     share: Vec<f32>,
     cosine: Vec<f32>,
     /// How much of each node was taken before.
@@ -236,14 +236,14 @@ pub(crate) struct Paid {
 
 /// Bone that a ball takes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Taken {
+pub(crate) struct RemovedBone {
     /// As if all of it had the reference density, node³.
     pub cost: f32,
     /// node³.
     pub volume: f32,
 }
 
-impl Paid {
+impl PayableNodes {
     pub fn with_capacity(limit: usize) -> Self {
         let room = || Vec::with_capacity(limit);
         Self { along: room(), apart: room(), share: room(), cosine: room(), gone: room(), price: room() }
@@ -260,7 +260,7 @@ impl Paid {
 
     /// Adds the node in a lane, of which so much is `gone`.
     #[inline]
-    pub fn push(&mut self, lane: usize, place: &Place, crossed: &Crossed, gone: f32x8, price: f32) {
+    pub fn push(&mut self, lane: usize, place: &Place, crossed: &CrossedDistances, gone: f32x8, price: f32) {
         let of = |all: f32x8| all.as_array()[lane];
         let values = [of(place.along), of(place.apart), of(crossed.share), of(crossed.cosine), of(gone), price];
         for (list, value) in self.all().into_iter().zip(values) {
@@ -280,7 +280,7 @@ impl Paid {
     }
 
     /// The bone that a ball of `radius` takes on a way of `way`.
-    pub fn taken(&self, radius: f32, way: f32) -> Taken {
+    pub fn taken(&self, radius: f32, way: f32) -> RemovedBone {
         let (mut costs, mut volumes) = (f32x8::ZERO, f32x8::ZERO);
         fn eights(list: &[f32]) -> impl Iterator<Item = &[f32; LANES]> {
             list.as_chunks().0.iter()
@@ -290,7 +290,7 @@ impl Paid {
         let costs_of = eights(&self.gone).zip(eights(&self.price));
         for (((along, apart), (share, cosine)), (gone, price)) in places.zip(surfaces).zip(costs_of) {
             let place = Place { along: f32x8::new(*along), apart: f32x8::new(*apart) };
-            let crossed = Crossed { share: f32x8::new(*share), cosine: f32x8::new(*cosine) };
+            let crossed = CrossedDistances { share: f32x8::new(*share), cosine: f32x8::new(*cosine) };
             // As it will be stored.
             let depth = (place.depth(radius, way) * CUT_STEPS).round() * (1.0 / CUT_STEPS);
             let taken = crossed.taken(covered(depth, radius));
@@ -298,7 +298,7 @@ impl Paid {
             volumes += volume;
             costs += f32x8::new(*price) * volume;
         }
-        Taken { cost: costs.reduce_add(), volume: volumes.reduce_add() }
+        RemovedBone { cost: costs.reduce_add(), volume: volumes.reduce_add() }
     }
 }
 
@@ -316,7 +316,7 @@ mod tests {
     use super::*;
 
     fn taken(share: f32, cosine: f32, covered: f32) -> f32 {
-        let crossed = Crossed { share: f32x8::splat(share), cosine: f32x8::splat(cosine) };
+        let crossed = CrossedDistances { share: f32x8::splat(share), cosine: f32x8::splat(cosine) };
         crossed.taken(f32x8::splat(covered)).as_array()[3]
     }
 

@@ -156,7 +156,7 @@ pub struct GodObjectSphere {
     /// radius, voxels.
     sure: (Vec3, f32),
     /// Which bone the window shows.
-    seen: Option<Seen>,
+    seen: Option<LastBone>,
     surface: LocalSurface,
     /// Whether the ball was clear of bone, so that nothing needs to be looked for inside it.
     clear: bool,
@@ -174,7 +174,7 @@ pub struct GodObjectSphere {
 
 /// The bone of the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Seen {
+struct LastBone {
     /// [`BoneVolume::id`].
     bone: u64,
     /// How often bone had been restored.
@@ -212,7 +212,7 @@ impl GodObjectSphere {
 
     /// Forgets what is not of this bone as it is now.
     fn look_at(&mut self, bone: &BoneVolume) {
-        let this = Some(Seen { bone: bone.id(), undone: bone.undone() });
+        let this = Some(LastBone { bone: bone.id(), undone: bone.undone() });
         if self.seen != this {
             self.seen = this;
             self.clear = false;

@@ -1,7 +1,7 @@
 //! CT and cut around a tool, on the nodes of the cut.
 
 use crate::solid::Fine;
-use crate::window::{Shown, Window};
+use crate::window::{Window, WindowContent};
 use glam::IVec3;
 use trepan_bone::BoneVolume;
 
@@ -32,7 +32,7 @@ pub(crate) struct Nodes {
 impl Nodes {
     /// For a tool of that radius.
     pub fn new(radius_mm: f32) -> Self {
-        let [cut, density] = [Shown::Cut, Shown::Density].map(Window::new);
+        let [cut, density] = [WindowContent::Cut, WindowContent::Density].map(Window::new);
         Self { cut, density, stride: 1, near: false, radius_mm }
     }
 

@@ -56,7 +56,7 @@ pub(crate) struct Discs {
     list: Vec<Disc>,
     /// The edge on which each disc stands.
     edges: Vec<Edge>,
-    kept: Kept,
+    kept: DiscCache,
     /// Bone in the rows around the tool, a bit a cell.
     bones: Vec<u128>,
     /// Where discs were gathered, from [`Discs::base`], and how far from there they may be.
@@ -101,13 +101,13 @@ struct Before {
     /// Cells from one crossing to the next.
     stride: i32,
     disc: Disc,
-    /// The value of [`Kept::wear`] when its normal was found.
+    /// The value of [`DiscCache::wear`] when its normal was found.
     wear: u32,
 }
 
 /// Discs of before, by edge: a tool that moves on meets most of them again.
 #[derive(Default)]
-struct Kept {
+struct DiscCache {
     before: Vec<Before>,
     /// How often bone has gone away.
     wear: u32,
@@ -167,7 +167,7 @@ impl Eight {
     }
 }
 
-impl Kept {
+impl DiscCache {
     /// The normal, curvature and size of before where they still hold. Those of a cut are found
     /// `anew` or after some ticks; those of the density do not change.
     fn known(&self, solid: &impl Solid, base: IVec3, edge: &Edge, anew: bool) -> Option<&Disc> {
@@ -211,7 +211,7 @@ impl Discs {
     /// Room for `limit` discs, each of at most `radius` voxels.
     pub fn new(limit: usize, radius: f32) -> Self {
         let (list, edges) = (Vec::with_capacity(limit), Vec::with_capacity(limit));
-        let kept = Kept { before: vec![Before::default(); CACHE], wear: 0, radius };
+        let kept = DiscCache { before: vec![Before::default(); CACHE], wear: 0, radius };
         Self { bones: Vec::with_capacity(1 << 14), list, edges, kept, limit, ..Self::default() }
     }
 
@@ -438,7 +438,7 @@ impl Discs {
         for (&at, found) in eight.list().iter().zip(discs) {
             let (edge, disc) = (&mut self.edges[at], &mut self.list[at]);
             self.kept.keep(fine, self.base, edge, found);
-            Kept::give(fine, self.base, edge, disc, found);
+            DiscCache::give(fine, self.base, edge, disc, found);
         }
     }
 

@@ -29,7 +29,7 @@ const BRICKS: i32 = 32;
 
 /// What a window shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shown {
+pub(crate) enum WindowContent {
     /// The CT's density at the nodes of the cut, HU.
     Density,
     /// The cut at its nodes.
@@ -37,7 +37,7 @@ pub(crate) enum Shown {
 }
 
 pub(crate) struct Window {
-    shown: Shown,
+    shown: WindowContent,
     cells: Vec<i16>,
     /// One box as it is read.
     read: Vec<i16>,
@@ -55,10 +55,10 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    pub fn new(shown: Shown) -> Self {
+    pub fn new(shown: WindowContent) -> Self {
         let (cells, seen) = (vec![0; 1 << (3 * MAX_BITS)], vec![0; BRICKS.pow(3) as usize]);
         let read = Vec::with_capacity(1 << (3 * MAX_BITS));
-        let scratch = BetweenScratch::new(if shown == Shown::Density { 1 << MAX_BITS } else { 0 });
+        let scratch = BetweenScratch::new(if shown == WindowContent::Density { 1 << MAX_BITS } else { 0 });
         let (brick, low) = (BRICK as i32, IVec3::ZERO);
         Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, border: CUT_SURFACE }
     }
@@ -86,7 +86,7 @@ impl Window {
         let mut low = self.low.clamp(centre + half + 1 - edge, centre - half);
         let far = (low - self.low).abs().max_element() >= edge;
         self.brick = BRICK as i32 * bone.cut_nodes();
-        if self.shown == Shown::Density && self.border != bone.isovalue() {
+        if self.shown == WindowContent::Density && self.border != bone.isovalue() {
             (self.filled, self.border) = (false, bone.isovalue());
         }
         if !self.filled || bits != self.bits || far {
@@ -125,7 +125,7 @@ impl Window {
             if window.seen[place(brick)] != window.version(bone, brick) {
                 window.see(bone, brick);
                 // Densities change beyond the brick, by less than a voxel.
-                let more = if window.shown == Shown::Density { bone.cut_nodes() } else { 0 };
+                let more = if window.shown == WindowContent::Density { bone.cut_nodes() } else { 0 };
                 let from = brick * window.brick;
                 window.read(bone, (from - more).max(low), (from + window.brick + more).min(high));
                 changed = true;
@@ -145,7 +145,7 @@ impl Window {
     }
 
     fn version(&self, bone: &BoneVolume, brick: IVec3) -> u32 {
-        if self.shown == Shown::Cut { bone.cut_version(brick) } else { bone.ct_version(brick) }
+        if self.shown == WindowContent::Cut { bone.cut_version(brick) } else { bone.ct_version(brick) }
     }
 
     fn see(&mut self, bone: &BoneVolume, brick: IVec3) {
@@ -158,7 +158,7 @@ impl Window {
             return;
         }
         self.read.resize(size.element_product() as usize, 0);
-        if self.shown == Shown::Cut {
+        if self.shown == WindowContent::Cut {
             bone.read_cut(from, size, &mut self.read);
         } else {
             bone.read_between(from, size, &mut self.scratch, &mut self.read);
@@ -186,8 +186,8 @@ impl Window {
     #[inline]
     fn scaled(&self, value: i16) -> f32 {
         match self.shown {
-            Shown::Cut => f32::from(self.border - value) * (1000.0 / CUT_STEPS),
-            Shown::Density => f32::from(value) - f32::from(self.border),
+            WindowContent::Cut => f32::from(self.border - value) * (1000.0 / CUT_STEPS),
+            WindowContent::Density => f32::from(value) - f32::from(self.border),
         }
     }
 
@@ -210,8 +210,8 @@ impl Window {
     #[inline]
     pub fn scaled_eight(&self, values: &[i16; 8]) -> f32x8 {
         match self.shown {
-            Shown::Cut => (f32::from(self.border) - wide(values)) * (1000.0 / CUT_STEPS),
-            Shown::Density => wide(values) - f32::from(self.border),
+            WindowContent::Cut => (f32::from(self.border) - wide(values)) * (1000.0 / CUT_STEPS),
+            WindowContent::Density => wide(values) - f32::from(self.border),
         }
     }
 
@@ -313,7 +313,7 @@ mod tests {
             let mut ct = VoxelVolume::isotropic([9, 10, 11], Vec3::ZERO, 0.3, 0i16);
             ct.data.iter_mut().enumerate().for_each(|(i, v)| *v = i as i16);
             let bone = BoneVolume::new(&ct, 400).unwrap();
-            let mut window = Window::new(Shown::Density);
+            let mut window = Window::new(WindowContent::Density);
             for (x, y, z, half) in path {
                 let centre = IVec3::new(x, y, z);
                 prop_assert!(window.cover(&bone, centre, half).is_some());
@@ -334,6 +334,6 @@ mod tests {
     #[test]
     fn more_than_it_can_hold_is_refused() {
         let bone = BoneVolume::new(&VoxelVolume::isotropic([2, 2, 2], Vec3::ZERO, 0.3, 900i16), 400).unwrap();
-        assert_eq!(Window::new(Shown::Density).cover(&bone, IVec3::ZERO, 64), None);
+        assert_eq!(Window::new(WindowContent::Density).cover(&bone, IVec3::ZERO, 64), None);
     }
 }

@@ -9,7 +9,7 @@
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::report::output::dated;
-use crate::session::{Ended, Place, Session};
+use crate::session::{Place, Session, SessionResult};
 use crate::{Inputs, Options, Program};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -69,7 +69,8 @@ fn one(
         record: None,
         ..options.clone()
     };
-    let Ended { summary, lack, .. } = Session::open_in(program, options, built_in.clone(), place.clone())?.run()?;
+    let SessionResult { summary, lack, .. } =
+        Session::open_in(program, options, built_in.clone(), place.clone())?.run()?;
     let replay = summary.replay.unwrap_or_default();
     let text = format!("{}, {:.1} mm3 removed", replay.describe(), summary.bone_removed_mm3);
     match lack {

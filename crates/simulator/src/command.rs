@@ -2,7 +2,7 @@
 //! code.
 
 use crate::batch;
-use crate::case::choice::{Built, PlannedCase, build_case, plan_case};
+use crate::case::choice::{BuiltCase, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
 use crate::constants;
 use crate::desk::{self, Done};
@@ -16,7 +16,7 @@ use crate::recordings;
 use crate::report::summary::{CutOff, behind, slow};
 use crate::report::{film, sessions, ticks};
 use crate::run::Quantiles;
-use crate::session::{Ended, Place, Session};
+use crate::session::{Place, Session, SessionResult};
 use crate::show::driver;
 use crate::{Inputs, Options, Program, SessionError};
 use std::io::IsTerminal;
@@ -117,7 +117,7 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
         }
         Task::Case(CaseTask::Series { folder }) => list_series(folder),
         Task::Case(CaseTask::Build { patient, out }) => {
-            build_case(program, patient, out, built_in).map(|Built { name, notes }| {
+            build_case(program, patient, out, built_in).map(|BuiltCase { name, notes }| {
                 notes.iter().for_each(|note| println!("note: {}", printable(note)));
                 let folder = printable(&out.display().to_string());
                 println!("{name} is in {folder}; open it with --case {folder}");
@@ -197,7 +197,7 @@ fn planned(
     Ok(ExitCode::SUCCESS)
 }
 
-fn report(ended: &Ended) -> ExitCode {
+fn report(ended: &SessionResult) -> ExitCode {
     let summary = &ended.summary;
     let Quantiles { p50, p99, .. } = summary.tick_us;
     println!(

@@ -9,7 +9,8 @@ use crate::run::watch::{Watched, Watching};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, ScriptError, Site};
 use trepan_haptics::{
-    Capabilities, Clutch, DeviceName, HapticDevice, Motion, Opened, Setting, ThreadedDevice, Watch, Workspace, mouse,
+    Capabilities, Clutch, DeviceName, HapticDevice, Motion, OpenedDevice, Setting, ThreadedDevice, Watch, Workspace,
+    mouse,
 };
 
 /// An open device of a hand.
@@ -44,7 +45,7 @@ impl OpenDevice {
             return Ok(Self::default());
         }
         let workspace = workspace(&plan.site, options.device_scale);
-        let Opened { device, watch, pointer } = opened(name, &Setting { workspace, script: &script }, rate_hz)?;
+        let OpenedDevice { device, watch, pointer } = opened(name, &Setting { workspace, script: &script }, rate_hz)?;
         Ok(Self { device: Some(device), watch, pointer, ..Self::default() })
     }
 
@@ -55,7 +56,8 @@ impl OpenDevice {
         let mut beside = workspace(&plan.site, options.device_scale);
         // With both hands in the middle of their workspaces the tools are side by side.
         beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
-        let Opened { mut device, watch, .. } = opened(name, &Setting { workspace: beside, script: &script }, rate_hz)?;
+        let OpenedDevice { mut device, watch, .. } =
+            opened(name, &Setting { workspace: beside, script: &script }, rate_hz)?;
         if name.is_hardware() {
             device = Box::new(ThreadedDevice::new(device));
         }
@@ -64,7 +66,7 @@ impl OpenDevice {
 }
 
 /// Opens a device; hardware gets a clutch, and must be as fast as the session.
-fn opened(name: &DeviceName, setting: &Setting<'_>, rate_hz: f32) -> Result<Opened, SessionError> {
+fn opened(name: &DeviceName, setting: &Setting<'_>, rate_hz: f32) -> Result<OpenedDevice, SessionError> {
     let mut opened = name.open(setting).map_err(refused)?;
     if name.is_hardware() {
         let Capabilities { name, rate_hz: most_hz, .. } = opened.device.capabilities();

@@ -61,7 +61,7 @@ mod uncertainty;
 mod whole;
 
 pub use case::Inputs;
-pub use case::anchors::Held;
+pub use case::anchors::BrainSupport;
 pub use case::cache::Cache;
 pub use case::import::open as open_case;
 pub use case::plan::Plan;

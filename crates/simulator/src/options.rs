@@ -3,7 +3,7 @@
 use crate::constants;
 use crate::error::SessionError;
 use crate::force_scale::ForceScale;
-use crate::ingredients::{Given, setting};
+use crate::ingredients::{KeyValue, setting};
 use crate::program::Program;
 use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -113,7 +113,7 @@ pub struct Options {
     /// Ingredient of the models by hand, as in element=locking-free,threads=2; the last one of a
     /// key counts. `--set list` prints the keys [default: by --quality; a replay's as recorded]
     #[arg(help_heading = "Models and accuracy", long = "set", value_name = "KEY=VALUE", value_delimiter = ',', value_parser = setting)]
-    pub settings: Vec<Option<Given>>,
+    pub settings: Vec<Option<KeyValue>>,
     /// Solver of the brain's tissue, as --set solver=NAME
     #[arg(help_heading = "Models and accuracy", long, value_name = "NAME")]
     pub solver: Option<String>,
@@ -369,7 +369,7 @@ pub enum RecordingTask {
 #[derive(Clone, Debug, Subcommand)]
 pub enum SessionsTask {
     /// Print a table: date, person, program, case, lesson, result, agreement with the plan, plunge
-    List(Wanted),
+    List(SessionFilter),
     /// Write one row per session, with every score, for a spreadsheet or R
     Export {
         /// New file
@@ -377,13 +377,13 @@ pub enum SessionsTask {
         csv: PathBuf,
         /// Which sessions
         #[command(flatten)]
-        wanted: Wanted,
+        wanted: SessionFilter,
     },
 }
 
 /// Which sessions are wanted; replays and watched sessions are left out.
 #[derive(Clone, Debug, Default, Args)]
-pub struct Wanted {
+pub struct SessionFilter {
     /// Folders to search [default: those of the start page, and trepan-out]
     #[arg(value_name = "FOLDER")]
     pub folders: Vec<PathBuf>,
@@ -497,9 +497,9 @@ impl Options {
     }
 
     /// Ingredients given by hand, `--rigid` and `--solver` first; refuses unknown names.
-    pub(crate) fn given(&self) -> Result<Vec<Given>, SessionError> {
+    pub(crate) fn given(&self) -> Result<Vec<KeyValue>, SessionError> {
         let flags = [("rigid", &self.rigid), ("solver", &self.solver)].into_iter();
-        let named = flags.filter_map(|(name, text)| Some(Given::by_flag(name, text.as_deref()?)));
+        let named = flags.filter_map(|(name, text)| Some(KeyValue::by_flag(name, text.as_deref()?)));
         let named: Result<Vec<_>, _> = named.collect();
         Ok(named.map_err(SessionError::Usage)?.into_iter().chain(self.settings.iter().flatten().cloned()).collect())
     }

@@ -18,17 +18,17 @@ use crate::progress::Progress;
 use crate::recordings;
 use crate::report::debrief::Debrief;
 use crate::report::drilled::{self, Drilled};
-use crate::report::kept::Kept;
+use crate::report::kept::SessionFolder;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{CutOff, Machine, Opening, SecondSummary, SolverSummary, Summary, fps};
 use crate::report::{film, output, slicer};
 use crate::run::film::{self as filmed, Filming};
-use crate::run::lesson::{Taught, Teacher};
+use crate::run::lesson::{Teacher, TeacherButtons};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
-use crate::run::watch::{self, Asked, Company, Share};
+use crate::run::watch::{self, PeerSession, Share, TeacherRequests};
 use crate::run::{Outcome, RenderInputs, Run, Stages, View};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
@@ -85,7 +85,7 @@ pub(crate) struct Place {
 
 /// Result of a session.
 #[derive(Debug)]
-pub struct Ended {
+pub struct SessionResult {
     /// Its summary.
     pub summary: Summary,
     /// Folder of its files.
@@ -194,7 +194,7 @@ impl Session {
     }
 
     /// Runs the session and writes its files; on failure no partly written file remains.
-    pub fn run(mut self) -> Result<Ended, SessionError> {
+    pub fn run(mut self) -> Result<SessionResult, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.setup.pieces(), self.whole());
         let (options, plan, rate_hz) = (&self.options, &self.setup.plan, self.setup.operation.rate_hz);
@@ -265,7 +265,7 @@ impl Session {
         let summary = summary.with(&outcome);
         self.write(&recording, &summary, &outcome, album.shots, (drilled, around))?;
         files.keep();
-        Ok(Ended { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
+        Ok(SessionResult { summary, out: self.out, case: self.case.case, signal: stop.signal(), lack })
     }
 
     /// Writes the files: summary, scores, report, markups, skull.
@@ -300,8 +300,8 @@ impl Session {
         let summary =
             serde_json::to_value(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
         let roots: Vec<PathBuf> = self.out.ancestors().nth(2).map(PathBuf::from).into_iter().collect();
-        let this = Kept::with(&self.out, summary);
-        Ok(Debrief::of(&this.summary, self.lesson.as_ref(), &this.before(&Kept::list(&roots))))
+        let this = SessionFolder::with(&self.out, summary);
+        Ok(Debrief::of(&this.summary, self.lesson.as_ref(), &this.before(&SessionFolder::list(&roots))))
     }
 
     fn windowed(&self) -> bool {
@@ -367,12 +367,12 @@ impl Session {
     /// window that watches another session sends such requests.
     fn company(
         &self,
-        asked: Option<Asked>,
+        asked: Option<TeacherRequests>,
         mut hands: [OptionalDevice; 2],
-    ) -> Result<(Company, [OptionalDevice; 2]), SessionError> {
-        let mut company = Company::default();
+    ) -> Result<(PeerSession, [OptionalDevice; 2]), SessionError> {
+        let mut company = PeerSession::default();
         if let Some([first, second, window]) = asked {
-            let taught = |hand: OptionalDevice, asked| hand.map(|device| Box::new(Taught::new(device, asked)) as _);
+            let taught = |hand: OptionalDevice, by| hand.map(|device| Box::new(TeacherButtons::new(device, by)) as _);
             let [one, other] = hands;
             hands = [taught(one, first), taught(other, second)];
             company.asked = Some(window);
@@ -438,7 +438,7 @@ impl Session {
         mut eyes: RenderInputs,
         graphics: &mut Result<Graphics, NoPicture>,
         pointer: Option<mouse::MouseHandle>,
-        company: Company,
+        company: PeerSession,
         stop: &Stop,
     ) -> Album {
         let Some(painter) = graphics.as_mut().ok().and_then(|g| g.painter.take()) else {
@@ -460,9 +460,9 @@ impl Session {
     }
 
     /// What the window needs of the session.
-    fn opened<'a>(&'a self, stage: &'a Stage) -> window::Opened<'a> {
+    fn opened<'a>(&'a self, stage: &'a Stage) -> window::SessionView<'a> {
         let is_knob = |device: &DeviceName| device.kind().name == spacemouse::DEVICE.name;
-        window::Opened {
+        window::SessionView {
             progress: &self.place.progress,
             stage,
             table: &self.setup,

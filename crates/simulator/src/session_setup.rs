@@ -1,7 +1,7 @@
 //! Setup of a session: patient, plan and models, and the stages built from them.
 
 use crate::case::Case;
-use crate::case::anchors::Held;
+use crate::case::anchors::BrainSupport;
 use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, Scene};
 use crate::device_limits::DeviceLimits;
@@ -13,7 +13,7 @@ use crate::program::Program;
 use crate::remark;
 use crate::report::regions::{Region, regions};
 use crate::run::{self, Stages};
-use crate::solver::{self, Ran};
+use crate::solver::{self, SolverInfo};
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_config::{BONE, HapticConfig, TISSUE, bone_force};
 use crate::stages::haptic_tick::HapticStage;
@@ -47,7 +47,7 @@ pub(crate) struct SessionSetup {
     filmed: Option<Arc<BoneVolume>>,
     young_mpa: f32,
     /// What runs as the solver, once it is built.
-    ran: OnceLock<Ran>,
+    ran: OnceLock<SolverInfo>,
 }
 
 impl SessionSetup {
@@ -116,7 +116,7 @@ impl SessionSetup {
 
     /// Remarks on the solver, for the report.
     pub fn solver_remarks(&self) -> Vec<String> {
-        self.ran.get().map(Ran::remarks).unwrap_or_default()
+        self.ran.get().map(SolverInfo::remarks).unwrap_or_default()
     }
 
     /// Creates the stages, with the tool at `start`.
@@ -167,7 +167,7 @@ impl SessionSetup {
     }
 
     /// What holds the brain, and the loads on it once the dura is open.
-    fn held(&self, brain: &RestBrain) -> Result<(Held, Settling), SessionError> {
+    fn held(&self, brain: &RestBrain) -> Result<(BrainSupport, Settling), SessionError> {
         let csf_loss = self.operation.csf_loss.unwrap_or_default();
         let outward = -self.plan.site.inward;
         match self.bone().filter(|_| self.is_anchored()) {
@@ -184,7 +184,7 @@ impl SessionSetup {
     }
 
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
-        let (Held { fixed, anchors, mut wall }, settling) = self.held(brain)?;
+        let (BrainSupport { fixed, anchors, mut wall }, settling) = self.held(brain)?;
         let body = brain.body(with.materials(self.young_mpa), with.pia_arachnoid_n_per_mm, &fixed, &anchors);
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
         let _first = self.ran.set(ran);

@@ -32,7 +32,7 @@ const TRIAL_MS: f64 = 100.0;
 
 /// What runs as the solver.
 #[derive(Clone, Debug)]
-pub(crate) struct Ran {
+pub(crate) struct SolverInfo {
     /// Name of the solver.
     pub name: &'static str,
     /// Where it runs.
@@ -43,7 +43,7 @@ pub(crate) struct Ran {
     lost: Arc<AtomicBool>,
 }
 
-impl Ran {
+impl SolverInfo {
     fn here(name: &'static str) -> Self {
         Self { name, device: SolverDevice::Cpu, fixed_nodes: 0, remark: None, lost: Arc::default() }
     }
@@ -66,9 +66,9 @@ pub(crate) fn build(
     wall: Option<&mut SkullWall>,
     tissue: &Tissue,
     ingredients: &Ingredients,
-) -> Result<(Box<dyn SoftSolver>, Ran), SessionError> {
+) -> Result<(Box<dyn SoftSolver>, SolverInfo), SessionError> {
     let (solver, ran) = on_any(body, wall, tissue, ingredients)?;
-    Ok((solver, Ran { fixed_nodes: body.fixed.len(), ..ran }))
+    Ok((solver, SolverInfo { fixed_nodes: body.fixed.len(), ..ran }))
 }
 
 fn on_any(
@@ -76,9 +76,9 @@ fn on_any(
     wall: Option<&mut SkullWall>,
     tissue: &Tissue,
     ingredients: &Ingredients,
-) -> Result<(Box<dyn SoftSolver>, Ran), SessionError> {
+) -> Result<(Box<dyn SoftSolver>, SolverInfo), SessionError> {
     if let Some(method) = trepan_soft::Method::named(tissue.solver) {
-        return Ok((method.build(body).map_err(refused)?, Ran::here(method.name())));
+        return Ok((method.build(body).map_err(refused)?, SolverInfo::here(method.name())));
     }
     let config = ingredients.config();
     let (on_card, remark) = match ingredients.device {
@@ -94,12 +94,12 @@ fn on_any(
     remark.iter().for_each(|remark| tracing::warn!("{remark}"));
     match on_card {
         Some(solver) => {
-            let ran = Ran { lost: solver.lost(), device: SolverDevice::Gpu, ..Ran::here("tled-gpu") };
+            let ran = SolverInfo { lost: solver.lost(), device: SolverDevice::Gpu, ..SolverInfo::here("tled-gpu") };
             Ok((Box::new(solver), ran))
         }
         None => {
             let solver = on_processor(body, wall, &config, ingredients)?;
-            Ok((Box::new(solver), Ran { remark, ..Ran::here("tled") }))
+            Ok((Box::new(solver), SolverInfo { remark, ..SolverInfo::here("tled") }))
         }
     }
 }
@@ -212,7 +212,7 @@ mod tests {
 
     /// Depth of the middle of the top, mm, 60 ms after a spring began to press on it, and the
     /// force, N.
-    fn pressed(ingredients: &Ingredients) -> ([f32; 2], Ran) {
+    fn pressed(ingredients: &Ingredients) -> ([f32; 2], SolverInfo) {
         let body = block(ingredients);
         let (mut solver, ran) = build(&body, None, &TLED, ingredients).unwrap();
         let mut spring = NodalContact::none();

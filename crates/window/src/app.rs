@@ -11,7 +11,7 @@ use crate::pointer::{Pointer, view_area};
 use crate::quality::{Quality, Step};
 use crate::screen::{Area, Screen};
 use crate::surface::{Ray, Surfaces};
-use crate::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, aids, banner, slices, timeline};
+use crate::{Draws, Panel, Playback, Session, Shared, SharedCell, Start, WindowInput, aids, banner, slices, timeline};
 use eframe::egui;
 use eframe::egui_wgpu::RenderState;
 use glam::Vec3;
@@ -32,7 +32,7 @@ pub(crate) const LARGE: f32 = 1.4;
 
 /// The application behind the window.
 pub(crate) struct Window<S, D> {
-    lent: Lent<S, D>,
+    lent: SharedCell<S, D>,
     start: Start,
     hand: ViewAndTool,
     traces: Traces,
@@ -66,7 +66,7 @@ fn is_large(ui: &egui::Ui) -> bool {
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
-    pub fn new(lent: Lent<S, D>, start: Start, copies: bool) -> Self {
+    pub fn new(lent: SharedCell<S, D>, start: Start, copies: bool) -> Self {
         let hardware = lent.borrow().as_ref().and_then(|s| s.renderer.device()).is_some_and(|gpu| !gpu.is_software());
         let head = lent.borrow().as_ref().map(|shared| shared.renderer.bounds());
         Self {

@@ -14,7 +14,7 @@
 use crate::app::Window;
 use crate::page::{self, Page, Textures};
 use crate::palette::SKY;
-use crate::{Closed, Lent, Session, Shared, Start, WindowError};
+use crate::{Closed, Session, Shared, SharedCell, Start, WindowError};
 use eframe::{egui, egui_wgpu::RenderState};
 use std::any::Any;
 use std::cell::RefCell;
@@ -26,7 +26,7 @@ use trepan_gpu::Gpu;
 use trepan_render::Painter;
 
 /// What a window shows.
-pub enum Shown<A> {
+pub enum Content<A> {
     /// A page.
     Page(Box<Page<A>>),
     /// The session that was sent to the window, and a strip with controls over it.
@@ -42,7 +42,7 @@ pub trait Host {
 
     /// Returns what to show now. `guest`: whether a session was sent to the window and is not over;
     /// a page in its place ends it.
-    fn shown(&mut self, guest: bool) -> Shown<Self::Action>;
+    fn shown(&mut self, guest: bool) -> Content<Self::Action>;
 
     /// Does what the user pressed.
     fn act(&mut self, action: Self::Action);
@@ -109,7 +109,7 @@ impl Offers {
 const POLL: [Duration; 2] = [Duration::from_millis(100), Duration::from_millis(500)];
 
 /// Type of the session and the painter in the window.
-type Lending = Lent<Sent, Painter>;
+type Lending = SharedCell<Sent, Painter>;
 
 /// The session in the window.
 struct Guest {
@@ -209,7 +209,7 @@ impl<H: Host> Pages<H> {
         }
         let poll = POLL[usize::from(self.device.as_ref().is_none_or(Gpu::is_software))];
         let actions = match host.shown(guest.is_some()) {
-            Shown::Page(page) => {
+            Content::Page(page) => {
                 guest.take().into_iter().for_each(Guest::leave);
                 let frame = egui::Frame::central_panel(ui.style()).inner_margin(16.0);
                 let drawn = egui::CentralPanel::default().frame(frame);
@@ -217,7 +217,7 @@ impl<H: Host> Pages<H> {
                 ui.request_repaint_after(poll);
                 actions
             }
-            Shown::Session(strip) => {
+            Content::Session(strip) => {
                 let strip = strip.map(|page| {
                     let panel = egui::Panel::top("strip").resizable(false).max_size(260.0);
                     panel.show(ui, |ui| page::strip(ui, &page, &mut self.textures)).inner
@@ -234,7 +234,7 @@ impl<H: Host> Pages<H> {
                 ui.request_repaint_after(poll);
                 strip.unwrap_or_default()
             }
-            Shown::Nothing => {
+            Content::Nothing => {
                 ui.send_viewport_cmd(egui::ViewportCommand::Close);
                 Vec::new()
             }
@@ -278,8 +278,8 @@ mod tests {
     impl Host for Desk {
         type Action = ();
 
-        fn shown(&mut self, _: bool) -> Shown<()> {
-            Shown::Page(Box::default())
+        fn shown(&mut self, _: bool) -> Content<()> {
+            Content::Page(Box::default())
         }
 
         fn act(&mut self, (): ()) {}

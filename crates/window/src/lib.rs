@@ -75,7 +75,7 @@ mod words;
 
 pub use capture::Capture;
 pub use draws::{Draws, Refined};
-pub use host::{Host, Offers, Pages, Shown, Stage, open, stage};
+pub use host::{Content, Host, Offers, Pages, Stage, open, stage};
 pub use input::{Pace, WindowInput};
 pub use page::{Amount, Button, Choosable, Drag, Item, Page, Picture};
 pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
@@ -180,7 +180,7 @@ pub(crate) struct Shared<S, D> {
 }
 
 /// Lent to the window and taken back when it is closed.
-pub(crate) type Lent<S, D> = Rc<RefCell<Option<Shared<S, D>>>>;
+pub(crate) type SharedCell<S, D> = Rc<RefCell<Option<Shared<S, D>>>>;
 
 /// Shows the window until it is closed. Must be called on the main thread.
 pub fn run<S, D>(title: &str, renderer: D, session: S, start: Start) -> Closed<S, D>
@@ -189,7 +189,7 @@ where
     D: Draws + 'static,
 {
     let shared = renderer.device().filter(|gpu| gpu.can_be_shared()).cloned();
-    let lent: Lent<S, D> = Rc::new(RefCell::new(Some(Shared { session, renderer, shown: false, fault: None })));
+    let lent: SharedCell<S, D> = Rc::new(RefCell::new(Some(Shared { session, renderer, shown: false, fault: None })));
     let shown = Rc::new(Cell::new(false));
     let create = |device: Option<&Gpu>| -> Box<dyn eframe::App> {
         shown.set(true);

@@ -6,7 +6,7 @@ use crate::input::ViewAndTool;
 use crate::keys::{Command, label};
 use crate::look::Look;
 use crate::palette::{GREEN, ORANGE, SKY};
-use crate::plot::{Drawn, Trace};
+use crate::plot::{Trace, TraceStyle};
 use crate::words::{sentence, tr};
 use crate::{Choice, Panel, tool_icon};
 use eframe::egui::{self, Color32, RichText};
@@ -116,7 +116,7 @@ fn heading(ui: &mut egui::Ui, text: String) {
 
 fn force(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
     heading(ui, tr(&format!("Force  {:.2} N", panel.force_n)));
-    traces.force.show(ui, Drawn { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
+    traces.force.show(ui, TraceStyle { name: "force", height: 90.0, mark: panel.force_limit_n.into(), colour: SKY });
     let most = traces.force.most();
     let note = format!("last {SECONDS_SHOWN:.0} s, most {most:.2} N, limit {:.1} N", panel.force_limit_n);
     ui.label(RichText::new(tr(&note)).size(12.0)).on_hover_text(tr("what your hand would feel on a device with force"));
@@ -125,7 +125,9 @@ fn force(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
 fn rate(ui: &mut egui::Ui, panel: &Panel, traces: &mut Traces) {
     if panel.rate_hz > 0.0 {
         heading(ui, tr(&format!("Rate  {:.0} Hz", panel.rate_hz)));
-        traces.rate.show(ui, Drawn { name: "rate", height: 50.0, mark: panel.wanted_rate_hz.into(), colour: GREEN });
+        traces
+            .rate
+            .show(ui, TraceStyle { name: "rate", height: 50.0, mark: panel.wanted_rate_hz.into(), colour: GREEN });
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct Trace {
 
 /// Style of a trace.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drawn<'a> {
+pub(crate) struct TraceStyle<'a> {
     /// Name of the plot.
     pub name: &'a str,
     /// Height, points.
@@ -52,8 +52,8 @@ impl Trace {
     }
 
     /// Draws the line from 0 to a little over the largest value and the mark.
-    pub fn show(&mut self, ui: &mut egui::Ui, drawn: Drawn<'_>) {
-        let top = (1.1 * drawn.mark.max(self.most())).max(1e-6);
+    pub fn show(&mut self, ui: &mut egui::Ui, style: TraceStyle<'_>) {
+        let top = (1.1 * style.mark.max(self.most())).max(1e-6);
         let now = self.samples.back().map_or(0.0, |s| s.x);
         let points = PlotPoints::Borrowed(self.samples.make_contiguous());
         ui.style_mut().visuals.extreme_bg_color = NIGHT;
@@ -64,12 +64,12 @@ impl Trace {
                 .allow_boxed_zoom(false)
                 .show_axes([false, true])
         };
-        let plot = still(Plot::new(drawn.name).height(drawn.height)).y_axis_min_width(32.0).show_x(false);
+        let plot = still(Plot::new(style.name).height(style.height)).y_axis_min_width(32.0).show_x(false);
         plot.show(ui, |plot| {
             plot.set_plot_bounds_x(now - self.seconds_shown..=now);
             plot.set_plot_bounds_y(0.0..=top);
-            plot.hline(HLine::new("limit", drawn.mark).color(VERMILION).style(egui_plot::LineStyle::dashed_loose()));
-            plot.line(Line::new(drawn.name, points).color(drawn.colour).width(1.5));
+            plot.hline(HLine::new("limit", style.mark).color(VERMILION).style(egui_plot::LineStyle::dashed_loose()));
+            plot.line(Line::new(style.name, points).color(style.colour).width(1.5));
         });
     }
 }

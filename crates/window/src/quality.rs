@@ -76,7 +76,7 @@ pub(crate) struct Quality {
     patience: u32,
     /// Pictures since it got finer.
     since_finer: u32,
-    seen: Option<Seen>,
+    seen: Option<PictureState>,
     moved_at: f64,
     rest: Rest,
     last: f64,
@@ -102,14 +102,14 @@ impl Quality {
     pub fn step(&mut self, frame: &Frame, size: [u32; 2], pending: bool, now: f64) -> Step {
         let moved = pending || frame.drilling || self.seen.as_ref().is_none_or(|seen| seen.differs(frame, size));
         if moved {
-            self.seen = Some(Seen::of(frame, size));
+            self.seen = Some(PictureState::of(frame, size));
             (self.moved_at, self.rest) = (now, Rest::Moving);
             return Step::Draw(self.detail());
         }
         match self.rest {
             Rest::Moving if now - self.moved_at < REST_S => Step::Keep,
             Rest::Moving => {
-                self.seen = Some(Seen::of(frame, size));
+                self.seen = Some(PictureState::of(frame, size));
                 self.rest = Rest::Sharp;
                 Step::Draw(1.0)
             }
@@ -174,7 +174,7 @@ impl Quality {
 
 /// What a picture showed, as far as it moves.
 #[derive(Debug)]
-struct Seen {
+struct PictureState {
     size: [u32; 2],
     fixed: Fixed,
     tools: [Option<(Tool, Pose)>; 2],
@@ -212,7 +212,7 @@ fn same_tool(a: &Option<(Tool, Pose)>, b: &Option<(Tool, Pose)>) -> bool {
         && still(end(pose), end(moved), 4.0 * STILL_MM)
 }
 
-impl Seen {
+impl PictureState {
     fn of(frame: &Frame, size: [u32; 2]) -> Self {
         let nodes = nodes(frame).collect();
         let (force, ghost) = (frame.overlay.force, frame.overlay.ghost);

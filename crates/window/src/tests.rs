@@ -75,7 +75,7 @@ impl Draws for TestPainter {
 
 pub(crate) struct Bench {
     pub window: Harness<'static, Window<TestSession, TestPainter>>,
-    lent: Lent<TestSession, TestPainter>,
+    lent: SharedCell<TestSession, TestPainter>,
 }
 
 impl Bench {
@@ -86,7 +86,7 @@ impl Bench {
         let painter = TestPainter(Painter::on(Err(GpuError::NoAdapter), &data, [160, 120]).unwrap(), None);
         let session = TestSession { panel, ..TestSession::default() };
         let shared = Shared { session, renderer: painter, shown: false, fault: None };
-        let lent: Lent<TestSession, TestPainter> = Rc::new(RefCell::new(Some(shared)));
+        let lent: SharedCell<TestSession, TestPainter> = Rc::new(RefCell::new(Some(shared)));
         let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 60.0);
         let microscope = Some(Camera { fov_rad: 0.2, ..Camera::viewed_from(Vec3::ZERO, Vec3::Z, 300.0) });
         let start = Start { microscope, ..Start::with(camera, Pose::from_translation(Vec3::new(0.0, 8.0, 0.0))) };

@@ -93,18 +93,18 @@ struct Pass<'a> {
     waiting_mm: f32,
     /// The first grip of the last step that was not passed yet.
     last: usize,
-    felt: Felt,
+    felt: ToolForce,
 }
 
 /// What the tool feels.
 #[derive(Default)]
-struct Felt {
+struct ToolForce {
     force: Vec3,
     /// About the tip, N mm.
     moment: Vec3,
 }
 
-impl Felt {
+impl ToolForce {
     fn add(&mut self, force: Vec3, arm: Vec3) {
         self.force += force;
         self.moment += arm.cross(force);
@@ -170,7 +170,7 @@ impl Foundation {
         let (touched, depth_mm) = (out.manifold.normal, out.manifold.depth_mm);
         let rod = self.radii.at(scene.tool, touched * (depth_mm - GROWS * scene.radius_mm).max(0.0));
         let mut pass =
-            Pass { scene, rod, touched, waiting_mm: WAITING * scene.radius_mm, last: 0, felt: Felt::default() };
+            Pass { scene, rod, touched, waiting_mm: WAITING * scene.radius_mm, last: 0, felt: ToolForce::default() };
         self.springs.clear();
         self.grips.swap(0, 1);
         self.grips[0].clear();
@@ -292,7 +292,7 @@ impl Foundation {
     }
 
     /// Gives the hand the sum of what presses.
-    fn feel(&self, scene: &Scene, felt: &Felt, out: &mut TissueStep) {
+    fn feel(&self, scene: &Scene, felt: &ToolForce, out: &mut TissueStep) {
         let (time_ms, tip_mm) = (scene.tool.time_ms, scene.tool.tip());
         out.patch = SurfacePatch { time_ms, tip_mm, ..SurfacePatch::default() };
         let Some(normal) = felt.force.try_normalize() else { return };

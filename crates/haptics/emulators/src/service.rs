@@ -65,7 +65,7 @@ impl Default for Behaviour {
 
 /// What the service received.
 #[derive(Clone, Debug, Default)]
-pub struct Told {
+pub struct ReceivedCalls {
     /// The force on the motors, N.
     pub force: Option<[f64; 3]>,
     /// Time from the last change of behaviour to the first zero force.
@@ -86,7 +86,7 @@ pub struct Told {
 
 struct Shared {
     behaviour: Mutex<Behaviour>,
-    told: Mutex<Told>,
+    told: Mutex<ReceivedCalls>,
     changed: Mutex<Instant>,
     closing: AtomicBool,
 }
@@ -140,7 +140,7 @@ impl Service {
     }
 
     /// What it received so far.
-    pub fn told(&self) -> Told {
+    pub fn told(&self) -> ReceivedCalls {
         self.shared.told.lock().unwrap().clone()
     }
 }

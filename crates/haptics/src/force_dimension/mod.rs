@@ -23,8 +23,8 @@ mod library;
 
 use crate::ramp::Ramp;
 use crate::{
-    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, NameError, Opened, Reading, STALE_MS,
-    Status, Watch, Workspace,
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, NameError, OpenedDevice, Reading,
+    STALE_MS, Status, Watch, Workspace,
 };
 use library::{Drd, Outcome};
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ pub static DEVICE: Descriptor = Descriptor {
     open: |number, setting| {
         let index = number.and_then(|number| number.parse().ok()).unwrap_or(0);
         let config = Config { index, workspace: setting.workspace, ..Config::default() };
-        ForceDimension::open(&config).map(|device| Opened::watched(device.watch(), device))
+        ForceDimension::open(&config).map(|device| OpenedDevice::watched(device.watch(), device))
     },
 };
 

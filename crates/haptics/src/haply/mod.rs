@@ -30,9 +30,10 @@ mod websocket;
 use crate::latest::Latest;
 use crate::ramp::Ramp;
 use crate::{
-    Capabilities, Descriptor, DeviceError, HapticDevice, Listed, Motion, Opened, Reading, Status, Watch, Workspace,
+    Capabilities, Descriptor, DeviceError, HapticDevice, Listed, Motion, OpenedDevice, Reading, Status, Watch,
+    Workspace,
 };
-use protocol::{Frame, Garbled};
+use protocol::{Frame, InvalidMessage};
 use pump::{Command, Flags, News, Pump};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -58,7 +59,7 @@ pub static DEVICE: Descriptor = Descriptor {
             ids.into_iter().flat_map(|ids| ids.split('+')).map(|id| Some(id.to_owned()).filter(|id| !id.is_empty()));
         let (device, grip) = (ids.next().flatten(), ids.next().flatten());
         let config = Config { device, grip, workspace: setting.workspace, ..Config::default() };
-        Haply::open(&config).map(|device| Opened::watched(device.watch(), device))
+        Haply::open(&config).map(|device| OpenedDevice::watched(device.watch(), device))
     },
 };
 
@@ -268,8 +269,10 @@ fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<(Vec<String>,
                 .map_or_else(|| "no Inverse3 is connected".to_owned(), |id| format!("no Inverse3 {id} is connected"));
             Err(not_opened(reason, "plug it in, switch it on and see whether Haply Hub finds it"))
         }
-        Err(Garbled::TooOld) => Err(not_opened("its service is older than 3.5", "update Haply's Inverse service")),
-        Err(Garbled::NotJson) => {
+        Err(InvalidMessage::TooOld) => {
+            Err(not_opened("its service is older than 3.5", "update Haply's Inverse service"))
+        }
+        Err(InvalidMessage::NotJson) => {
             Err(not_opened("what answers is not Haply's service", "see which program has its port"))
         }
     }

@@ -70,7 +70,7 @@ struct GripButtons {
 
 /// Why a message is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Garbled {
+pub(super) enum InvalidMessage {
     /// Not JSON, or not an object.
     NotJson,
     /// Device lists are maps: the service is older than 3.5.
@@ -78,7 +78,7 @@ pub(super) enum Garbled {
 }
 
 /// Ids of the devices in the service's inventory; only `wanted`, if given.
-pub(super) fn devices(message: &str, wanted: Option<&str>) -> Result<Vec<String>, Garbled> {
+pub(super) fn devices(message: &str, wanted: Option<&str>) -> Result<Vec<String>, InvalidMessage> {
     let message = object(message)?;
     let ids = entries(&message, "inverse3").filter_map(|entry| entry["device_id"].as_str());
     Ok(ids.filter(|id| wanted.is_none_or(|wanted| wanted.eq_ignore_ascii_case(id))).map(str::to_owned).collect())
@@ -94,7 +94,7 @@ pub(super) fn grip(message: &str, wanted: Option<&str>) -> Option<String> {
 /// Parses the entries for `device` and `grip` (any grip if `None`) from a message. A grip in
 /// several lists is read once. Returns `None` if the device list exists but lacks the device: it is
 /// disconnected.
-pub(super) fn frame(message: &str, device: &str, grip: Option<&str>) -> Result<Option<Frame>, Garbled> {
+pub(super) fn frame(message: &str, device: &str, grip: Option<&str>) -> Result<Option<Frame>, InvalidMessage> {
     let message = object(message)?;
     let mut frame = Frame::default();
     let listed = entries(&message, "inverse3").find(|entry| entry["device_id"] == device);
@@ -159,11 +159,11 @@ pub(super) fn event(message: &str) -> Option<Event> {
     }
 }
 
-fn object(message: &str) -> Result<Value, Garbled> {
-    let value: Value = serde_json::from_str(message).map_err(|_| Garbled::NotJson)?;
+fn object(message: &str) -> Result<Value, InvalidMessage> {
+    let value: Value = serde_json::from_str(message).map_err(|_| InvalidMessage::NotJson)?;
     match &value["inverse3"] {
-        _ if !value.is_object() => Err(Garbled::NotJson),
-        Value::Object(_) => Err(Garbled::TooOld),
+        _ if !value.is_object() => Err(InvalidMessage::NotJson),
+        Value::Object(_) => Err(InvalidMessage::TooOld),
         _ => Ok(value),
     }
 }
@@ -244,9 +244,9 @@ mod tests {
 
     #[test]
     fn an_old_service_and_invalid_messages_are_distinguished() {
-        assert_eq!(frame(r#"{"inverse3":{"049D":{}}}"#, "049D", None), Err(Garbled::TooOld));
-        assert_eq!(frame("{\"inverse3", "049D", None), Err(Garbled::NotJson));
-        assert_eq!(frame("[1]", "049D", None), Err(Garbled::NotJson));
+        assert_eq!(frame(r#"{"inverse3":{"049D":{}}}"#, "049D", None), Err(InvalidMessage::TooOld));
+        assert_eq!(frame("{\"inverse3", "049D", None), Err(InvalidMessage::NotJson));
+        assert_eq!(frame("[1]", "049D", None), Err(InvalidMessage::NotJson));
     }
 
     #[test]

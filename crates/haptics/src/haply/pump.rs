@@ -82,7 +82,7 @@ impl Pump {
             let force = self.next_force(&mut last);
             if let Err(error) = self.exchange(force) {
                 self.watch.set(Some(match error.kind() {
-                    io::ErrorKind::InvalidData => Fault::Garbled,
+                    io::ErrorKind::InvalidData => Fault::InvalidMessage,
                     io::ErrorKind::TimedOut => Fault::ServiceSilent,
                     _ => Fault::Disconnected,
                 }));
@@ -145,7 +145,7 @@ impl Pump {
                 Ok(None) => return Err(io::ErrorKind::NotConnected.into()),
                 Err(_) if self.garbled < MAX_GARBLED => {
                     self.garbled += 1;
-                    self.ramp.cut(Fault::Garbled);
+                    self.ramp.cut(Fault::InvalidMessage);
                 }
                 Err(_) => return Err(io::ErrorKind::InvalidData.into()),
             }

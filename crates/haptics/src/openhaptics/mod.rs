@@ -32,7 +32,7 @@ mod servo;
 use crate::latest::Latest;
 use crate::ramp::Ramp;
 use crate::{
-    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, Opened, Reading, Status, Watch,
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, OpenedDevice, Reading, Status, Watch,
     Workspace,
 };
 use library::Hd;
@@ -58,7 +58,7 @@ pub static DEVICE: Descriptor = Descriptor {
     },
     open: |device, setting| {
         let config = Config { device: device.map(str::to_owned), workspace: setting.workspace, ..Config::default() };
-        OpenHaptics::open(&config).map(|device| Opened::watched(device.watch(), device))
+        OpenHaptics::open(&config).map(|device| OpenedDevice::watched(device.watch(), device))
     },
 };
 

@@ -29,7 +29,7 @@ mod hid;
 
 use crate::mouse::rotation_vector;
 use crate::{
-    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, Opened, Reading, Status, Watch,
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, OpenedDevice, Reading, Status, Watch,
     Workspace, no_argument,
 };
 use std::io;
@@ -48,7 +48,7 @@ pub static DEVICE: Descriptor = Descriptor {
     probe: || link(&Source::Any).map(|(_, name)| vec![Listed::new("spacemouse", format!("ready: {name}"))]),
     open: |_, setting| {
         let config = Config { workspace: setting.workspace, ..Config::default() };
-        SpaceMouse::open(&config).map(|device| Opened::watched(device.watch(), device))
+        SpaceMouse::open(&config).map(|device| OpenedDevice::watched(device.watch(), device))
     },
 };
 

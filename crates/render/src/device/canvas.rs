@@ -1,7 +1,7 @@
 //! The textures for one picture size, bound to the passes.
 
 use super::average::Mean;
-use super::eye::Eye;
+use super::eye::EyeTextures;
 use super::passes::{Division, Passes};
 use crate::RenderError;
 use crate::layout::Layout;
@@ -15,7 +15,7 @@ pub(crate) struct Canvas {
     pub layout: Layout,
     pub picture: Texture,
     /// One eye, or the left and the right.
-    pub eyes: Vec<Eye>,
+    pub eyes: Vec<EyeTextures>,
     /// Both eyes' views, for an anaglyph.
     pub anaglyph: Option<Bindings>,
     pub slices: [Bindings; 3],
@@ -38,10 +38,10 @@ impl Canvas {
         };
         let picture = sheet("picture", division.size, Format::Rgba8Unorm, true)?;
         let areas = StereoLook::areas(division.stereo, layout.view);
-        let eye = |(number, area)| Eye::new(gpu, number, area, &division, passes, &picture);
+        let eye = |(number, area)| EyeTextures::new(gpu, number, area, &division, passes, &picture);
         let eyes = areas.into_iter().enumerate().map(eye).collect::<Result<Vec<_>, _>>()?;
         let anaglyph = match &eyes[..] {
-            [Eye { apart: Some((left, _)), .. }, Eye { apart: Some((right, _)), .. }]
+            [EyeTextures { apart: Some((left, _)), .. }, EyeTextures { apart: Some((right, _)), .. }]
                 if division.stereo == Some(StereoLook::Anaglyph) =>
             {
                 Some(passes.anaglyph.bind(gpu, &passes.scenes[0], [left, right])?)

@@ -13,7 +13,7 @@ use trepan_gpu::{Bindings, Buffer, Depth, DrawTarget, Format, Gpu, Recorder, Tar
 
 /// The textures of an eye.
 #[derive(Debug)]
-pub(crate) struct Eye {
+pub(crate) struct EyeTextures {
     /// Index of its scene uniform.
     number: usize,
     /// Rectangle of its view in the picture.
@@ -36,7 +36,7 @@ pub(crate) struct Eye {
     brain: Option<[Bindings; 2]>,
 }
 
-impl Eye {
+impl EyeTextures {
     /// A view drawn with `drawn` pixels, directly into the picture or separately.
     pub fn new(
         gpu: &Gpu,

@@ -13,7 +13,7 @@
 //! ambient light reaches farther than a brick.
 
 use crate::RenderError;
-use crate::bricks::{Followed, Grid, Leaps, densities};
+use crate::bricks::{Followed, Grid, SkipDistances, densities};
 use crate::scene::Scene;
 use crate::smooth::Smooth;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub(crate) const VOLUMES: [Slot; 6] =
 pub(crate) struct Skull {
     bone: Option<Arc<BoneVolume>>,
     pub grid: Grid,
-    leaps: Leaps,
+    leaps: SkipDistances,
     seen: Vec<u32>,
     pub density: Texture,
     smooth: (Smooth, Texture),
@@ -48,7 +48,7 @@ impl Skull {
     pub fn new(gpu: &Gpu, bone: Option<Arc<BoneVolume>>) -> Result<Self, RenderError> {
         let grid = Grid::of(bone.as_deref());
         let seen = bone.as_ref().map_or_else(Vec::new, |bone| bone.seen());
-        let leaps = Leaps::of(bone.as_deref(), &grid);
+        let leaps = SkipDistances::of(bone.as_deref(), &grid);
         let volume = |label, size: [usize; 3], format| {
             let size = size.map(|n| n as u32);
             Texture::new(gpu, &TextureSpec { label, size, volume: true, format, drawn_to: false, stored_to: false })

@@ -3,7 +3,7 @@
 use super::drilled::{Surface, lift, shown_hu};
 use super::line::Line;
 use super::root::enter;
-use crate::bricks::{BLOCK, Followed, Grid, Leaps, NOTHING, densities};
+use crate::bricks::{BLOCK, Followed, Grid, NOTHING, SkipDistances, densities};
 use crate::cut::height;
 use crate::drilled::LEAP;
 use crate::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
@@ -46,7 +46,7 @@ impl Default for Casting {
 pub(crate) struct Bricks {
     bone: Option<Arc<BoneVolume>>,
     pub grid: Grid,
-    pub leaps: Leaps,
+    pub leaps: SkipDistances,
     seen: Vec<u32>,
     /// HU of the padded grid as scanned, x fastest.
     density: Vec<i16>,
@@ -60,7 +60,7 @@ impl Bricks {
     pub fn of(bone: Option<Arc<BoneVolume>>) -> Self {
         let grid = Grid::of(bone.as_deref());
         let seen = bone.as_ref().map_or_else(Vec::new, |bone| bone.seen());
-        let leaps = Leaps::of(bone.as_deref(), &grid);
+        let leaps = SkipDistances::of(bone.as_deref(), &grid);
         let density = densities(bone.as_deref(), [0; 3], grid.dims, |hu| hu);
         let (smooth, crowd) = (Smooth::of(bone.as_deref(), &grid), grid.shares(bone.as_deref()));
         Self { bone, grid, leaps, seen, density, smooth, crowd, casting: Casting::default() }

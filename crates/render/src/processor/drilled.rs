@@ -2,7 +2,7 @@
 
 use super::line::Line;
 use super::root::{blend, first_of_both, first_root};
-use crate::bricks::{Grid, Leaps};
+use crate::bricks::{Grid, SkipDistances};
 use crate::drilled::{FAR, LEAP};
 use crate::mix::{least, trilinear};
 use glam::{IVec3, Vec3, Vec3A, Vec4};
@@ -35,7 +35,7 @@ pub(crate) fn shown_hu(grid: &Grid, hu: f32, depth: f32) -> f32 {
     hu.min((f32::from(grid.isovalue) - RAMP_HU * depth).max(f32::from(AIR_HU)))
 }
 
-impl Leaps {
+impl SkipDistances {
     /// How deep a place lies in what was cut, nodes; [`FAR`] far from all cuts.
     #[inline(always)]
     pub fn depth(&self, grid: &Grid, g: Vec3) -> f32 {

@@ -13,7 +13,7 @@ use crate::recast::Recast;
 
 /// The stored hits and the view of an eye.
 #[derive(Debug)]
-pub(crate) struct Eye {
+pub(crate) struct EyeHits {
     /// Rectangle of its view in the picture.
     pub area: [u32; 4],
     /// Width and height of the drawn view, pixels; enlarged into the rectangle.
@@ -31,7 +31,7 @@ pub(crate) struct Eye {
 /// Edge pixels that a thread takes at once.
 const CHUNK: usize = 256;
 
-impl Eye {
+impl EyeHits {
     pub fn of(area: [u32; 4], size: [u32; 2]) -> Self {
         let [width, height] = size.map(|n| n as usize);
         Self {

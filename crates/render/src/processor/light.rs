@@ -4,7 +4,7 @@ use super::Inputs;
 use super::brain::Fragment;
 use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
-use super::tool::{Met, lit};
+use super::tool::{ToolHit, lit};
 use crate::bricks::NOTHING;
 use crate::mix::trilinear;
 use crate::mri::Signals;
@@ -16,7 +16,7 @@ use std::sync::LazyLock;
 pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
-    let meets = |n: usize| if near[n] { Met::of(scene.tools()[n], eye, along) } else { Met::NONE };
+    let meets = |n: usize| if near[n] { ToolHit::of(scene.tools()[n], eye, along) } else { ToolHit::NONE };
     let [first, second] = [meets(0), meets(1)];
     // Where one plane cuts both, the depths are equal: bone is shown, even if the mesh reaches into
     // it.
@@ -166,7 +166,7 @@ pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
 }
 
 /// Shades a tool hit; `look` is the style of its tip.
-fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, look: f32) -> Vec3 {
+fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &ToolHit, look: f32) -> Vec3 {
     let on_tip = met.t() == met.at[0];
     let axis = (met.tail - met.tip).truncate().normalize();
     let normal = met.normal(point);
@@ -178,7 +178,7 @@ fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, look: f32) -> 
     lit(scene, colour, normal, along, 1.0, 1.0, 0.7)
 }
 
-fn burr_colour(scene: &Scene, point: Vec3, met: &Met, axis: Vec3) -> Vec3 {
+fn burr_colour(scene: &Scene, point: Vec3, met: &ToolHit, axis: Vec3) -> Vec3 {
     let away = point - met.tip.truncate();
     let across = scene.spin.truncate();
     let angle = away.dot(axis.cross(across)).atan2(away.dot(across));

@@ -38,7 +38,7 @@ use crate::border::Border;
 use crate::camera::View;
 use crate::frame::{Frame, SceneData};
 use crate::image::Image;
-use crate::kept::Kept;
+use crate::kept::SceneCache;
 use crate::layout::Layout;
 use crate::mri::Signals;
 use crate::overlay::items;
@@ -50,7 +50,7 @@ use crate::stereo::StereoLook;
 pub use bricks::Casting;
 
 use bricks::Bricks;
-use eye::Eye;
+use eye::EyeHits;
 use glam::Vec3;
 use skull::Ray;
 use std::sync::Arc;
@@ -67,7 +67,7 @@ pub struct ProcessorRenderer {
     picture: Image,
     stereo: Option<StereoLook>,
     /// One eye, or the left and the right.
-    eyes: Vec<Eye>,
+    eyes: Vec<EyeHits>,
     /// Fraction of the 3-D view's pixels along an edge.
     detail: f32,
     /// The next slice to be drawn.
@@ -95,11 +95,11 @@ pub(crate) struct Inputs<'a> {
 impl ProcessorRenderer {
     /// Loads a scene for pictures of `size` pixels, width and height.
     pub fn new(data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
-        Self::with(Kept::of(data)?, size)
+        Self::with(SceneCache::of(data)?, size)
     }
 
     /// Creates a renderer from a stored scene.
-    pub(crate) fn with(kept: Kept, size: [u32; 2]) -> Result<Self, RenderError> {
+    pub(crate) fn with(kept: SceneCache, size: [u32; 2]) -> Result<Self, RenderError> {
         let mut renderer = Self {
             bounds: kept.bounds,
             bricks: Bricks::of(kept.bone),
@@ -152,7 +152,7 @@ impl ProcessorRenderer {
         let areas = StereoLook::areas(stereo, layout.view);
         let drawn = |area: &[u32; 4]| [area[2], area[3]].map(|n| ((n as f32 * self.detail).round() as u32).clamp(1, n));
         if !self.eyes.iter().map(|eye| (eye.area, eye.size)).eq(areas.iter().map(|area| (*area, drawn(area)))) {
-            self.eyes = areas.iter().map(|area| Eye::of(*area, drawn(area))).collect();
+            self.eyes = areas.iter().map(|area| EyeHits::of(*area, drawn(area))).collect();
         }
         Ok(())
     }

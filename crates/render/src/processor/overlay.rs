@@ -1,7 +1,7 @@
 //! CPU version of `overlay.wgsl`: draws each shape in its pixel rectangle.
 
 use super::light::shown;
-use super::tool::{Met, lit, shaft};
+use super::tool::{ToolHit, lit, shaft};
 use crate::bricks::NOTHING;
 use crate::camera::View;
 use crate::overlay::Item;
@@ -21,7 +21,7 @@ pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4
         if t >= NOTHING {
             continue;
         }
-        let tools = scene.tools().map(|tool| Met::of(tool, eye, along).t());
+        let tools = scene.tools().map(|tool| ToolHit::of(tool, eye, along).t());
         let hidden = t > depth(at).min(tools[0]).min(tools[1]);
         let alpha = item.colour.w * if hidden { HIDDEN } else { 1.0 };
         let colour = shown(lit(scene, item.colour.truncate(), normal, along, 1.0, 1.0, 0.3));
@@ -60,7 +60,7 @@ pub(crate) fn inside([left, top, right, bottom]: [usize; 4], [x, y]: [usize; 2])
 }
 
 fn tool(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
-    let met = Met::of([item.tip, item.tail], eye, along);
+    let met = ToolHit::of([item.tip, item.tail], eye, along);
     (met.t(), met.normal(eye + met.t() * along))
 }
 

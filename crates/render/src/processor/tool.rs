@@ -14,14 +14,14 @@ fn ball(eye: Vec3, along: Vec3, centre: Vec3, radius: f32) -> f32 {
 }
 
 /// Intersection of a ray with a tool.
-pub(crate) struct Met {
+pub(crate) struct ToolHit {
     pub tip: Vec4,
     pub tail: Vec4,
     /// Distances along the ray to ball, shaft and far end, or [`NOTHING`].
     pub at: [f32; 3],
 }
 
-impl Met {
+impl ToolHit {
     pub const NONE: Self = Self { tip: Vec4::ZERO, tail: Vec4::ZERO, at: [NOTHING; 3] };
 
     pub fn of([tip, tail]: [Vec4; 2], eye: Vec3, along: Vec3) -> Self {

@@ -17,7 +17,7 @@
 //! In a haptic tick.
 
 use super::cell;
-use super::frame::{Held, Rival, framed};
+use super::frame::{HeldTool, Rival, framed};
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::rows::each;
@@ -169,7 +169,7 @@ impl Brute {
 impl Rival for Brute {
     const MAX_BITES: usize = MAX_TRIANGLES;
 
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep) {
         let device = tool.tip();
         self.follow(bone, device.as_dvec3(), out);
         let proxy = self.centre.as_vec3();

@@ -30,7 +30,7 @@
 //! For a steady force: depth is counted from voxel centres, so that it steps by fractions of a
 //! voxel. Against thin walls: it has no proxy.
 
-use super::frame::{Held, Rival, framed};
+use super::frame::{HeldTool, Rival, framed};
 use super::obb_tree::ObbTree;
 use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
@@ -174,7 +174,7 @@ impl BurrAndShaft {
 }
 
 impl Rival for BurrAndShaft {
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep) {
         self.tree.renew(bone);
         let pose = tool.world_from_tool;
         held.proxy = pose;

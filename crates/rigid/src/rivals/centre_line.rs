@@ -21,7 +21,7 @@
 //! For burrs that are seen: the line has no thickness, so that a burr sinks in to its centre before
 //! it touches.
 
-use super::frame::{Held, Rival, framed};
+use super::frame::{HeldTool, Rival, framed};
 use super::ray_trace::over_iso;
 use super::traverse::first_bone;
 use crate::method::{Descriptor, Extent};
@@ -116,7 +116,7 @@ impl CentreLine {
 }
 
 impl Rival for CentreLine {
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep) {
         let (tip, shaft, arm) = self.springs(bone, &tool.world_from_tool, out);
         held.proxy = tool.world_from_tool;
         held.proxy.translation += tip + shaft;

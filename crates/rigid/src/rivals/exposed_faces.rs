@@ -32,10 +32,10 @@
 //! Where depth is wanted below half a voxel: planes stand on the voxels' faces. Against thin walls:
 //! it has no proxy.
 
-use super::frame::{Felt, PenaltyProbe, Pushes, ball_shell, framed};
+use super::frame::{PenaltyProbe, Pushes, WholeContact, ball_shell, framed};
 use super::shell::Shell;
 use crate::RigidStep;
-use crate::burr::Worn;
+use crate::burr::WornVoxel;
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::surface::NEIGHBOURS;
@@ -49,7 +49,7 @@ struct Faces {
     shell: Shell,
     pushes: Pushes,
     /// The voxels that hold erosion points.
-    worn: Vec<Worn>,
+    worn: Vec<WornVoxel>,
 }
 
 impl Faces {
@@ -84,7 +84,7 @@ fn plane(bone: &BoneVolume, reach_mm: f32, point: Vec3, inward: Vec3, visited: &
 }
 
 impl PenaltyProbe for Faces {
-    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<WholeContact> {
         self.pushes.clear();
         self.worn.clear();
         let still = Pose::from_translation(pose.translation);
@@ -93,7 +93,7 @@ impl PenaltyProbe for Faces {
             if !bone.is_bone(near.voxel) {
                 return;
             }
-            self.worn.push(Worn { voxel: near.voxel, share: 1.0, floor_hu: AIR_HU.into() });
+            self.worn.push(WornVoxel { voxel: near.voxel, share: 1.0, floor_hu: AIR_HU.into() });
             let found = plane(bone, tool.tip_radius_mm, near.point, near.inward, &mut out.voxels_swept);
             if let Some((depth_mm, normal)) = found.filter(|&(depth_mm, _)| depth_mm > 0.0) {
                 self.pushes.push(Contact { point: near.point, normal, depth_mm }, out);
@@ -102,7 +102,7 @@ impl PenaltyProbe for Faces {
         self.pushes.deepest(out)
     }
 
-    fn wears(&mut self, _: &BoneVolume, _: &Tool, _: &Pose, _: &Felt) -> Option<&[Worn]> {
+    fn wears(&mut self, _: &BoneVolume, _: &Tool, _: &Pose, _: &WholeContact) -> Option<&[WornVoxel]> {
         Some(&self.worn)
     }
 }

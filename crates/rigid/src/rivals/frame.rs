@@ -9,7 +9,7 @@
 //! Penalties against thin walls: past the middle of a wall the nearest way out leads to the far
 //! side, and a fast tool is through between two ticks.
 
-use crate::burr::{Burr, Cut, Worn};
+use crate::burr::{Burr, Cut, WornVoxel};
 use crate::nodes::Nodes;
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
@@ -29,14 +29,14 @@ pub(crate) trait Rival: Send {
     const MAX_BITES: usize = 16384;
 
     /// Finds the contact of a tool whose pose is finite, moves the proxy in `held` and cuts.
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep);
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep);
 
     /// Forgets all history; the tool is at `pose`.
     fn reset(&mut self, _pose: Pose) {}
 }
 
 /// The tool with its proxy and its burr.
-pub(crate) struct Held {
+pub(crate) struct HeldTool {
     pub tool: Tool,
     pub proxy: Pose,
     burr: Burr,
@@ -48,7 +48,7 @@ pub(crate) struct Held {
     dt_ms: f32,
 }
 
-impl Held {
+impl HeldTool {
     /// Where the burr cuts in this tick, takes bone away between `device` and `proxy`, pressed
     /// `depth_mm` deep.
     pub fn cut(&mut self, bone: &BoneVolume, device: Vec3, proxy: Vec3, depth_mm: f32, out: &mut RigidStep) {
@@ -75,7 +75,7 @@ impl Held {
 
     /// Where the burr cuts in this tick, wears these voxels with what its load earns, `depth_mm`
     /// deep along `normal`.
-    pub fn erode(&mut self, bone: &BoneVolume, worn: &[Worn], normal: Vec3, depth_mm: f32, out: &mut RigidStep) {
+    pub fn erode(&mut self, bone: &BoneVolume, worn: &[WornVoxel], normal: Vec3, depth_mm: f32, out: &mut RigidStep) {
         if self.cuts && depth_mm.is_finite() && self.dt_ms.is_finite() && self.dt_ms > 0.0 {
             let proxy = self.proxy.translation;
             let (radius_mm, dt_ms) = (self.tool.tip_radius_mm, self.dt_ms);
@@ -102,7 +102,7 @@ impl Held {
 
 struct Framed<R> {
     rival: R,
-    held: Held,
+    held: HeldTool,
     /// Whether the proxy has been put anywhere yet.
     placed: bool,
 }
@@ -112,7 +112,7 @@ struct Framed<R> {
 pub(crate) fn framed<R: Rival + 'static>(tool: &Tool, removal: RemovalLaw, rival: R) -> Box<dyn RigidContact> {
     let burr = Burr::new(removal, R::MAX_BITES);
     let nodes = Nodes::new(tool.tip_radius_mm);
-    let held = Held { tool: *tool, proxy: Pose::IDENTITY, burr, nodes, bone: u64::MAX, cuts: false, dt_ms: 0.0 };
+    let held = HeldTool { tool: *tool, proxy: Pose::IDENTITY, burr, nodes, bone: u64::MAX, cuts: false, dt_ms: 0.0 };
     Box::new(Framed { rival, held, placed: false })
 }
 
@@ -152,16 +152,16 @@ impl<R: Rival> RigidContact for Framed<R> {
 /// What a penalty method knows to answer.
 pub(crate) trait PenaltyProbe: Send {
     /// What the tool at `pose` feels; `None` without contact. Fills contacts and counts of `out`.
-    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt>;
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<WholeContact>;
 
     /// The voxels that a burr wears which feels this; `None` for one that cuts by its shape.
-    fn wears(&mut self, _bone: &BoneVolume, _tool: &Tool, _pose: &Pose, _felt: &Felt) -> Option<&[Worn]> {
+    fn wears(&mut self, _bone: &BoneVolume, _tool: &Tool, _pose: &Pose, _felt: &WholeContact) -> Option<&[WornVoxel]> {
         None
     }
 }
 
 /// A contact as a whole.
-pub(crate) struct Felt {
+pub(crate) struct WholeContact {
     /// Unit vector out of the bone.
     pub normal: Vec3,
     /// Depth along it, mm.
@@ -171,11 +171,11 @@ pub(crate) struct Felt {
 }
 
 impl<P: PenaltyProbe> Rival for P {
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep) {
         held.proxy = tool.world_from_tool;
         let felt = self.feel(bone, &held.tool, &tool.world_from_tool, out);
         let Some(felt) = felt else { return };
-        let Felt { normal, depth_mm, burr } = felt;
+        let WholeContact { normal, depth_mm, burr } = felt;
         held.proxy.translation += depth_mm * normal;
         held.report(normal, depth_mm, out);
         if !held.cuts {
@@ -190,14 +190,14 @@ impl<P: PenaltyProbe> Rival for P {
 }
 
 /// The direction of `push` and `depth`, if both are something.
-pub(crate) fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<Felt> {
+pub(crate) fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<WholeContact> {
     let normal = push.normalize_or_zero();
     if normal == Vec3::ZERO {
         // Opposed contacts cancel: there is no way to push.
         out.fallbacks += u32::from(out.points_in_contact > 0);
         return None;
     }
-    (depth_mm > 0.0 && depth_mm.is_finite()).then_some(Felt { normal, depth_mm, burr: depth_mm * normal })
+    (depth_mm > 0.0 && depth_mm.is_finite()).then_some(WholeContact { normal, depth_mm, burr: depth_mm * normal })
 }
 
 /// What the points of a shell push.
@@ -224,7 +224,7 @@ impl Pushes {
     }
 
     /// The direction of all pushes together, and the depth of the deepest along it.
-    pub fn deepest(&self, out: &mut RigidStep) -> Option<Felt> {
+    pub fn deepest(&self, out: &mut RigidStep) -> Option<WholeContact> {
         out.voxels_in_contact = out.points_in_contact;
         let push: Vec3 = self.0.iter().map(|c| c.depth_mm * c.normal).sum();
         let normal = push.normalize_or_zero();

@@ -39,7 +39,7 @@
 //! # When not to use it
 //! Against thin walls and strong hands: the layer that pushes is half a voxel deep.
 
-use super::frame::{Held, Rival, ball_shell, framed};
+use super::frame::{HeldTool, Rival, ball_shell, framed};
 use super::shell::Shell;
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
@@ -205,7 +205,7 @@ impl Coupled {
 }
 
 impl Rival for Coupled {
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep) {
         let pose = tool.world_from_tool;
         if self.hand.distance(pose.translation) > JUMP_MM {
             self.reset(pose);

@@ -20,7 +20,7 @@
 //! # When not to use it
 //! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
 
-use super::frame::{Felt, PenaltyProbe, Pushes, ball_shell, framed};
+use super::frame::{PenaltyProbe, Pushes, WholeContact, ball_shell, framed};
 use super::shell::Shell;
 use crate::RigidStep;
 use crate::method::Descriptor;
@@ -36,7 +36,7 @@ struct Rays {
 }
 
 impl PenaltyProbe for Rays {
-    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<WholeContact> {
         self.pushes.clear();
         let still = Pose::from_translation(pose.translation);
         self.shell.near(bone, &still, (1, 0.0), |near| {

@@ -29,7 +29,7 @@
 //! Where forces should grow in proportion to depth: they grow with its square, half as much at half
 //! the depth, and stiffness at the reference depth is twice k. Against thin walls: it has no proxy.
 
-use super::frame::{Felt, PenaltyProbe, REFERENCE_MM, answer, ball_shell, framed};
+use super::frame::{PenaltyProbe, REFERENCE_MM, WholeContact, answer, ball_shell, framed};
 use super::ray_trace::{over_iso, way_out};
 use super::shell::Shell;
 use crate::RigidStep;
@@ -73,7 +73,7 @@ impl Vertices {
 }
 
 impl PenaltyProbe for Vertices {
-    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<WholeContact> {
         let (mut moment, parts) = (Vec3::ZERO, [(&self.ball, tool.tip_radius_mm), (&self.shaft, tool.shaft_radius_mm)]);
         let [burr, shaft] = parts.map(|(shell, longest)| {
             let mut push = Vec3::ZERO;
@@ -94,7 +94,7 @@ impl PenaltyProbe for Vertices {
         let push = burr + shaft;
         let felt = answer(push, self.gain * push.length(), out)?;
         out.manifold.couple_mm = moment / push.length();
-        Some(Felt { burr: self.gain * burr, ..felt })
+        Some(WholeContact { burr: self.gain * burr, ..felt })
     }
 }
 

@@ -32,7 +32,7 @@
 //! For force feedback on a hand: [`god_object_sphere`](crate::god_object_sphere) is smoother and
 //! nearer to the surface. It is here for comparison.
 
-use super::frame::{Held, Rival, framed};
+use super::frame::{HeldTool, Rival, framed};
 use super::sweep::{Ball, Sweep};
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
@@ -116,7 +116,7 @@ pub fn new(tool: &Tool, config: Config) -> Box<dyn RigidContact> {
 
 impl Thesis {
     /// Moves the proxy towards `to`; returns whether bone stopped it.
-    fn sweep(&self, bone: &BoneVolume, to: Vec3, held: &mut Held, out: &mut RigidStep) -> bool {
+    fn sweep(&self, bone: &BoneVolume, to: Vec3, held: &mut HeldTool, out: &mut RigidStep) -> bool {
         let ball = Ball { radius_mm: held.tool.tip_radius_mm, shell: &self.shell.points };
         let stop = ball.sweep(bone, self.config.sweep, held.proxy.translation, to, &mut out.voxels_swept);
         held.proxy.translation = stop.centre;
@@ -163,7 +163,7 @@ impl Thesis {
     }
 
     /// Steps 2 and 3 without a contact set: one more sweep decides.
-    fn sweep_decides(&self, bone: &BoneVolume, device: Vec3, held: &mut Held, out: &mut RigidStep) {
+    fn sweep_decides(&self, bone: &BoneVolume, device: Vec3, held: &mut HeldTool, out: &mut RigidStep) {
         let from = held.proxy.translation;
         if self.sweep(bone, device, held, out) {
             held.report((from - device).normalize_or_zero(), self.config.preset_depth_mm, out);
@@ -176,7 +176,7 @@ impl Thesis {
         bone: &BoneVolume,
         device: Vec3,
         (normal, depth): (Vec3, f32),
-        held: &mut Held,
+        held: &mut HeldTool,
         out: &mut RigidStep,
     ) {
         let from = held.proxy.translation;
@@ -187,7 +187,7 @@ impl Thesis {
     }
 
     /// Step 4.
-    fn drill(&self, bone: &BoneVolume, device: Vec3, held: &mut Held, out: &mut RigidStep) {
+    fn drill(&self, bone: &BoneVolume, device: Vec3, held: &mut HeldTool, out: &mut RigidStep) {
         let proxy = held.proxy.translation;
         match self.config.removal {
             RemovalLaw::PerTick { .. } => held.wear(bone, self.touched.iter().map(|t| t.voxel), out),
@@ -197,7 +197,7 @@ impl Thesis {
 }
 
 impl Rival for Thesis {
-    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut HeldTool, out: &mut RigidStep) {
         let device = tool.tip();
         held.proxy.rotation = tool.world_from_tool.rotation;
         self.sweep(bone, device, held, out);

@@ -36,9 +36,9 @@
 //! Where forces should grow in proportion to depth: stiffness at the reference depth is 1.5 k, at
 //! first touch nothing. Against edges and thin walls, where there is less bone than a cap has.
 
-use super::frame::{Felt, PenaltyProbe, REFERENCE_MM, answer, framed};
+use super::frame::{PenaltyProbe, REFERENCE_MM, WholeContact, answer, framed};
 use crate::RigidStep;
-use crate::burr::Worn;
+use crate::burr::WornVoxel;
 use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
@@ -62,7 +62,7 @@ const ROW: usize = 32;
 const MAX_WORN: usize = 4096;
 
 struct Sum {
-    worn: Vec<Worn>,
+    worn: Vec<WornVoxel>,
 }
 
 /// Bone in the ball, voxels.
@@ -132,7 +132,7 @@ fn overlap(bone: &BoneVolume, centre: Vec3, radius: f32) -> Overlap {
 }
 
 impl PenaltyProbe for Sum {
-    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<WholeContact> {
         let (tip, spacing) = (pose.translation, bone.spacing_mm());
         let radius = tool.tip_radius_mm / spacing;
         let found = overlap(bone, bone.grid_of(tip), radius);
@@ -143,13 +143,13 @@ impl PenaltyProbe for Sum {
         // A centre of mass so near to the ball's is rounding: there is no way to push.
         let push = if found.moment.length() > LEAST_OFF * found.volume { -found.moment } else { Vec3::ZERO };
         let felt = answer(push, cap_mm * (cap_mm / REFERENCE_MM).sqrt(), out);
-        if let Some(Felt { normal, depth_mm, .. }) = felt {
+        if let Some(WholeContact { normal, depth_mm, .. }) = felt {
             out.manifold.push(Contact { point: tip - tool.tip_radius_mm * normal, normal, depth_mm });
         }
         felt
     }
 
-    fn wears(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, felt: &Felt) -> Option<&[Worn]> {
+    fn wears(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, felt: &WholeContact) -> Option<&[WornVoxel]> {
         let (centre, spacing, worn) = (bone.grid_of(pose.translation), bone.spacing_mm(), &mut self.worn);
         let radius = tool.tip_radius_mm / spacing + 0.5;
         let aside = |voxel: IVec3| (voxel.as_vec3() - centre).reject_from_normalized(felt.normal).length_squared();
@@ -163,7 +163,7 @@ impl PenaltyProbe for Sum {
                 let over = f32::from(bone.hu(voxel)) - floor_hu;
                 if over >= 1.0 && worn.len() < MAX_WORN {
                     widest = widest.max(aside(voxel));
-                    worn.push(Worn { voxel, share: (over * PER_HU).min(1.0), floor_hu });
+                    worn.push(WornVoxel { voxel, share: (over * PER_HU).min(1.0), floor_hu });
                 }
             }
         });

@@ -14,8 +14,8 @@ fn solid(distance: impl Fn(DVec3) -> f64 + Send + Sync + 'static) -> Bone {
 #[test]
 fn a_pressed_ball_is_held_where_closed_forms_say() {
     let outside = 12.0 * OBLIQUE;
-    type Held = fn(DVec3) -> DVec3;
-    let cases: [(Bone, Held); 3] = [
+    type ClosedForm = fn(DVec3) -> DVec3;
+    let cases: [(Bone, ClosedForm); 3] = [
         (solid(|p| p.dot(OBLIQUE)), |p| p + (R - p.dot(OBLIQUE)).max(0.0) * OBLIQUE),
         (solid(|p| p.length() - 8.0), |p| p.normalize() * p.length().max(8.0 + R)),
         (solid(|p| 16.0 - p.length()), |p| p.clamp_length_max(16.0 - R)),

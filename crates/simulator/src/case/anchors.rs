@@ -39,7 +39,7 @@ const LAYER_MM: [f32; 2] = [1.0, 8.0];
 const MIN_FIXED: usize = 12;
 
 /// What holds a brain.
-pub struct Held {
+pub struct BrainSupport {
     /// Nodes that do not move.
     pub fixed: Vec<u32>,
     /// Springs to places at rest.
@@ -53,9 +53,9 @@ impl RestBrain {
     ///
     /// # Errors
     /// When the mesh names a node that is not there, or has one that is nowhere.
-    pub fn held_by_base(&self, bone: Option<Arc<BoneVolume>>) -> Result<Held, ConfigError> {
+    pub fn held_by_base(&self, bone: Option<Arc<BoneVolume>>) -> Result<BrainSupport, ConfigError> {
         let wall = bone.map(|bone| SkullWall::new(bone, &self.mesh, &self.fixed)).transpose()?;
-        Ok(Held { fixed: self.fixed.clone(), anchors: Vec::new(), wall })
+        Ok(BrainSupport { fixed: self.fixed.clone(), anchors: Vec::new(), wall })
     }
 
     /// Holds the brain in its skull by stem, arachnoid, falx and bridging veins, but not under the
@@ -63,7 +63,7 @@ impl RestBrain {
     ///
     /// # Errors
     /// When the mesh names a node that is not there, or has one that is nowhere.
-    pub fn held_in_skull(&self, bone: Arc<BoneVolume>, plan: &Plan) -> Result<Held, ConfigError> {
+    pub fn held_in_skull(&self, bone: Arc<BoneVolume>, plan: &Plan) -> Result<BrainSupport, ConfigError> {
         let fixed = stem(&self.mesh);
         let wall = SkullWall::new(bone, &self.mesh, &fixed)?;
         let place = |node: u32| self.mesh.positions[node as usize];
@@ -94,7 +94,7 @@ impl RestBrain {
         };
         let mut anchors: Vec<Anchor> = wall.border().iter().map(on_border).collect();
         anchors.extend(falx(&self.mesh, middle, top, &fixed));
-        Ok(Held { fixed, anchors, wall: Some(wall) })
+        Ok(BrainSupport { fixed, anchors, wall: Some(wall) })
     }
 }
 

@@ -145,7 +145,7 @@ fn on_case(
 }
 
 /// A case that was built in a folder.
-pub(crate) struct Built {
+pub(crate) struct BuiltCase {
     /// Its name.
     pub name: String,
     /// Remarks of the import.
@@ -158,7 +158,7 @@ pub(crate) fn build_case(
     patient: &Patient,
     out: &Path,
     built_in: Inputs,
-) -> Result<Built, SessionError> {
+) -> Result<BuiltCase, SessionError> {
     patient.check()?;
     if out.exists() {
         return Err(SessionError::Usage(format!(
@@ -175,7 +175,7 @@ pub(crate) fn build_case(
         let remedy = "give --out in a folder that exists, may be written to and has room";
         SessionError::Usage(format!("cannot write {}: {fault}; {remedy}", out.display()))
     })?;
-    Ok(Built { name: case.name, notes: case.notes })
+    Ok(BuiltCase { name: case.name, notes: case.notes })
 }
 
 /// Refuses a case without the skull or brain that the program needs.

@@ -43,12 +43,12 @@ impl Session for Draft {
 }
 
 /// The skull of a draft, and the camera that looks at it.
-pub(crate) struct Looked {
+pub(crate) struct DraftView {
     skull: DraftSkull,
     camera: Camera,
 }
 
-impl Looked {
+impl DraftView {
     /// The skull of a cached case, seen over its opening.
     pub fn cached(folder: &Path) -> Result<Option<Self>, SessionError> {
         let of = |(skull, opening): (_, Opening)| Self { skull, camera: first_view(&opening.into()) };
@@ -71,7 +71,7 @@ impl Looked {
 
 /// Shows a draft until another session takes the window; returns whether it came to that.
 pub(crate) fn show(
-    Looked { skull, camera }: Looked,
+    DraftView { skull, camera }: DraftView,
     name: String,
     device: Result<Gpu, GpuError>,
     (stage, loading): (&Stage, &Progress),

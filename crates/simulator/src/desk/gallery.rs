@@ -31,7 +31,7 @@ const SIZES: [([f32; 2], f32); 4] =
 
 /// A program in a window that a test looks at.
 pub(crate) struct Gallery {
-    window: Harness<'static, Pages<Desk>>,
+    window: Harness<'static, Pages<App>>,
     program: Program,
     home: PathBuf,
     /// What is cut off.
@@ -54,13 +54,13 @@ impl Gallery {
         let language = std::env::var("TREPAN_GALLERY_LANGUAGE").unwrap_or("en".into());
         let options = Options::try_parse_from(["x", "--quality", "draft", "--language", &language]).unwrap();
         let (stage, offers) = window::stage();
-        let desk = Desk::new(program, options, built_in, (stage, Err(GpuError::NoAdapter)), Stop::default());
+        let desk = App::new(program, options, built_in, (stage, Err(GpuError::NoAdapter)), Stop::default());
         let pages = Pages::undisplayed(offers, desk);
         let mut harness = Harness::builder().with_size([1280.0, 800.0]);
         if std::env::var_os("TREPAN_GALLERY").is_some() {
             harness = harness.wgpu();
         }
-        let window = harness.build_ui_state(|ui, pages: &mut Pages<Desk>| pages.draw(ui), pages);
+        let window = harness.build_ui_state(|ui, pages: &mut Pages<App>| pages.draw(ui), pages);
         Self { window, program, home: home.into(), cut: Vec::new() }
     }
 

@@ -3,14 +3,14 @@
 use crate::case::Case;
 use crate::error::SessionError;
 use crate::progress::{Progress, RUNNING, Stage};
-use crate::session::{Ended, Place};
+use crate::session::{Place, SessionResult};
 use crate::settings::Settings;
 use std::thread::JoinHandle;
 
 /// What a job came to.
 pub(crate) enum Done {
     /// A session.
-    Session(Box<Ended>),
+    Session(Box<SessionResult>),
     /// A recording that was looked at.
     Viewed,
     /// A case that is to be looked at.

@@ -26,7 +26,7 @@ use crate::options::Options;
 use crate::program::Program;
 use crate::run::stop::Stop;
 use crate::show::driver;
-use crate::{Inputs, desk::language::Languages, desk::state::Desk};
+use crate::{Inputs, desk::language::Languages, desk::state::App};
 use trepan_window as window;
 
 /// Runs the program in a window until it is closed; returns what the last session came to.
@@ -43,7 +43,7 @@ pub(crate) fn run(program: Program, options: Options, built_in: Inputs) -> Optio
         return Some(Err(SessionError::Usage(format!("--language: there is no language {code}; give one of {known}"))));
     }
     let starts = options.names_no_session();
-    let desk = Desk::new(program, options, built_in, (stage, device.clone()), stop);
+    let desk = App::new(program, options, built_in, (stage, device.clone()), stop);
     let desk = if starts { desk } else { desk.begin_directly() };
     let title = format!("Trepan {}", program.name());
     let (desk, offers, shown) = window::open(&title, device.as_ref().ok(), offers, desk);

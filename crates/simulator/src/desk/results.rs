@@ -3,7 +3,7 @@
 use crate::desk::action::Action;
 use crate::printable::{count, printable};
 use crate::report::debrief::{Debrief, Row};
-use crate::report::kept::Kept;
+use crate::report::kept::SessionFolder;
 use crate::report::sessions::{self, SessionRow};
 use crate::settings::Recent;
 use crate::training::Lesson;
@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use trepan_window::{Item, Page};
 
 /// The page of a session's result.
-pub(crate) fn page(folder: &Path, kept: &[Kept], lessons: &[Lesson]) -> Page<Action> {
-    let Some(session) = Kept::of(folder) else {
+pub(crate) fn page(folder: &Path, kept: &[SessionFolder], lessons: &[Lesson]) -> Page<Action> {
+    let Some(session) = SessionFolder::of(folder) else {
         return Page { title: "This session has no summary".into(), foot: vec![home()], ..Page::default() };
     };
     let lesson = lessons.iter().find(|lesson| lesson.name == session.lesson);
@@ -97,7 +97,7 @@ pub(crate) struct Sessions {
 }
 
 impl Sessions {
-    pub fn of(kept: &[Kept], lessons: &[Lesson], recent: &[Recent]) -> Self {
+    pub fn of(kept: &[SessionFolder], lessons: &[Lesson], recent: &[Recent]) -> Self {
         Self { rows: sessions::rows(kept, lessons, recent), only: String::new(), first: None }
     }
 
@@ -171,9 +171,11 @@ fn tried(times: usize) -> String {
 }
 
 /// The page of all lessons; `closed` is why none can begin.
-pub(crate) fn lessons(lessons: &[Lesson], kept: &[Kept], person: &str, closed: Option<&str>) -> Page<Action> {
+pub(crate) fn lessons(lessons: &[Lesson], kept: &[SessionFolder], person: &str, closed: Option<&str>) -> Page<Action> {
     let lesson = |(at, lesson): (usize, &Lesson)| {
-        let mine = |kept: &&Kept| kept.lesson == lesson.name && kept.person.trim().eq_ignore_ascii_case(person.trim());
+        let mine = |kept: &&SessionFolder| {
+            kept.lesson == lesson.name && kept.person.trim().eq_ignore_ascii_case(person.trim())
+        };
         let tries = kept.iter().filter(mine);
         let passed = tries.clone().any(|kept| Debrief::of(&kept.summary, Some(lesson), &[]).passed == Some(true));
         let state = match (passed, tries.count()) {

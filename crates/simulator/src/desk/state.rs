@@ -9,7 +9,7 @@ use crate::compare::compare;
 use crate::desk::action::Action;
 use crate::desk::browse::{self, Folder, Goal};
 use crate::desk::check::Check;
-use crate::desk::draft::{self, Looked};
+use crate::desk::draft::{self, DraftView};
 use crate::desk::form::Form;
 use crate::desk::job::{Done, Job, Work};
 use crate::desk::pages;
@@ -19,7 +19,7 @@ use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
 use crate::progress::Progress;
-use crate::report::kept::Kept;
+use crate::report::kept::SessionFolder;
 use crate::run::stop::Stop;
 use crate::session::{Place, Session};
 use crate::settings::{Recent, Source, sessions};
@@ -29,7 +29,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::Listed;
-use trepan_window::{Host, Page, Shown, Stage, speak};
+use trepan_window::{Content, Host, Page, Stage, speak};
 
 /// What the window shows.
 enum View {
@@ -53,7 +53,7 @@ enum View {
 const PICTURE: &str = "frames/frame-before.png";
 
 /// The program behind the window.
-pub(crate) struct Desk {
+pub(crate) struct App {
     program: Program,
     base: Options,
     built_in: Inputs,
@@ -75,7 +75,7 @@ pub(crate) struct Desk {
     pictures: Pictures,
 }
 
-impl Desk {
+impl App {
     /// Shows the start page.
     pub fn new(
         program: Program,
@@ -159,7 +159,7 @@ impl Desk {
             let (stage, device, name) = (self.stage.clone(), self.device.clone(), name.clone());
             let (loading, read) = (progress.clone(), progress.awaits_skull());
             std::thread::spawn(move || {
-                let looked = cached.map_or_else(|| Ok(Looked::read(&read)), |folder| Looked::cached(&folder));
+                let looked = cached.map_or_else(|| Ok(DraftView::read(&read)), |folder| DraftView::cached(&folder));
                 let shown = looked.and_then(|looked| match looked {
                     Some(looked) => draft::show(looked, name, device, (&stage, &loading)),
                     None => Ok(false),
@@ -233,8 +233,8 @@ impl Desk {
         self.form.settings.write().err().into_iter().for_each(|fault| tracing::warn!("settings: {fault}"));
     }
 
-    fn kept(&self) -> Vec<Kept> {
-        Kept::list(&[sessions(), PathBuf::from("trepan-out")])
+    fn kept(&self) -> Vec<SessionFolder> {
+        SessionFolder::list(&[sessions(), PathBuf::from("trepan-out")])
     }
 
     fn browse(&mut self, goal: Goal, path: &Path) {
@@ -274,7 +274,7 @@ impl Desk {
 
     /// Replays a session on its case, which is a recent one or the built-in one.
     fn replay(&mut self, recording: &Path) {
-        let name = Kept::of(recording.parent().unwrap_or(recording)).map(|kept| kept.case);
+        let name = SessionFolder::of(recording.parent().unwrap_or(recording)).map(|kept| kept.case);
         let is =
             |case: &&Recent| name.as_ref().is_some_and(|name| case.hash.get(..8).is_some_and(|h| name.ends_with(h)));
         let built_in = || Recent { name: self.built_in.name.unwrap_or_default().into(), ..Recent::default() };
@@ -299,16 +299,16 @@ fn session(program: Program, options: Options, built_in: Inputs) -> Work {
     })
 }
 
-impl Host for Desk {
+impl Host for App {
     type Action = Action;
 
-    fn shown(&mut self, guest: bool) -> Shown<Action> {
+    fn shown(&mut self, guest: bool) -> Content<Action> {
         self.form.devices.extend(self.devices.try_iter().flatten());
         if let Some(page) = self.failed.1.try_iter().last() {
             self.view = View::Page(Box::new(page));
         }
         if self.stop.asked() && !matches!(self.view, View::Session(..)) {
-            return Shown::Nothing;
+            return Content::Nothing;
         }
         if let View::Session(job, _) = &self.view
             && job.is_done()
@@ -319,19 +319,21 @@ impl Host for Desk {
         }
         match &self.view {
             View::Start => {
-                Shown::Page(Box::new(pages::start(self.program, &self.form, self.pictures.of(&self.form.case))))
+                Content::Page(Box::new(pages::start(self.program, &self.form, self.pictures.of(&self.form.case))))
             }
-            View::Browse(goal, folder, written) => Shown::Page(Box::new(pages::browse(*goal, folder, written))),
-            View::Sessions(sessions) => Shown::Page(Box::new(sessions.page())),
-            View::Page(page) => Shown::Page(page.clone()),
-            View::Check(check, fault) => Shown::Page(Box::new(check.page(*fault, &self.form))),
+            View::Browse(goal, folder, written) => Content::Page(Box::new(pages::browse(*goal, folder, written))),
+            View::Sessions(sessions) => Content::Page(Box::new(sessions.page())),
+            View::Page(page) => Content::Page(page.clone()),
+            View::Check(check, fault) => Content::Page(Box::new(check.page(*fault, &self.form))),
             View::Session(job, name) => match (job.is_running(), guest) {
-                (true, true) => Shown::Session(None),
-                (true, false) => Shown::Page(Box::new(pages::writing())),
-                (false, true) => Shown::Session(Some(Box::new(pages::loading(name, job.loaded(&self.form.settings))))),
-                (false, false) => Shown::Page(Box::new(pages::loading(name, job.loaded(&self.form.settings)))),
+                (true, true) => Content::Session(None),
+                (true, false) => Content::Page(Box::new(pages::writing())),
+                (false, true) => {
+                    Content::Session(Some(Box::new(pages::loading(name, job.loaded(&self.form.settings)))))
+                }
+                (false, false) => Content::Page(Box::new(pages::loading(name, job.loaded(&self.form.settings)))),
             },
-            View::Closed => Shown::Nothing,
+            View::Closed => Content::Nothing,
         }
     }
 
@@ -402,7 +404,7 @@ impl Host for Desk {
     }
 }
 
-impl Desk {
+impl App {
     /// The lessons of the program.
     fn lessons(&self) -> Vec<Lesson> {
         Lesson::of(self.program, Lesson::folder().as_deref())
@@ -538,7 +540,7 @@ const OPENER: &str = if cfg!(target_os = "macos") {
     "xdg-open"
 };
 
-impl Desk {
+impl App {
     /// Opens a page or a folder as the desktop does; says so where that fails.
     fn open(&self, path: &Path) {
         let (path, failed) = (path.to_owned(), self.failed.0.clone());

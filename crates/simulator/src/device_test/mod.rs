@@ -27,7 +27,7 @@ use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{
-    Capabilities, DeviceName, HapticDevice, Motion, NameError, Opened, Setting, Status, Watch, Workspace,
+    Capabilities, DeviceName, HapticDevice, Motion, NameError, OpenedDevice, Setting, Status, Watch, Workspace,
 };
 use trial::{Part, Trial};
 
@@ -75,7 +75,7 @@ fn open(name: &str, end_ms: f64) -> Result<Subject, SessionError> {
         Script::named(script.unwrap_or_default(), &site, end_ms)
     };
     let opened = name.open(&Setting { workspace: Workspace::default(), script: &script });
-    let Opened { device, watch, .. } = opened.map_err(|fault| usage(&fault))?;
+    let OpenedDevice { device, watch, .. } = opened.map_err(|fault| usage(&fault))?;
     Ok(Subject { name, device, watch })
 }
 

@@ -398,7 +398,7 @@ impl Ingredients {
 
 /// A key with the value that a user gave it.
 #[derive(Clone)]
-pub struct Given {
+pub struct KeyValue {
     /// The key.
     pub key: &'static Key,
     /// Its value.
@@ -407,13 +407,13 @@ pub struct Given {
     pub flag: String,
 }
 
-impl core::fmt::Debug for Given {
+impl core::fmt::Debug for KeyValue {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(&self.flag)
     }
 }
 
-impl Given {
+impl KeyValue {
     /// A value by a flag of the key's own name; refuses an unknown value.
     pub fn by_flag(name: &str, text: &str) -> Result<Self, String> {
         let key = Key::named(name).ok_or_else(|| format!("no key {name}"))?;
@@ -423,7 +423,7 @@ impl Given {
 }
 
 /// Parses `KEY=VALUE`, or `KEY.PART=VALUE` for a part of it; `None` for `list`.
-pub fn setting(text: &str) -> Result<Option<Given>, String> {
+pub fn setting(text: &str) -> Result<Option<KeyValue>, String> {
     if text == "list" {
         return Ok(None);
     }
@@ -436,7 +436,7 @@ pub fn setting(text: &str) -> Result<Option<Given>, String> {
     let key = Key::named(name).ok_or_else(|| format!("{name} is not known; {}", known()))?;
     let mut scratch = Ingredients { rigid: Some(god_object_sphere::METHOD.name), ..Ingredients::default() };
     key.set(&mut scratch, &value)?;
-    Ok(Some(Given { key, text: value, flag: format!("--set {text}") }))
+    Ok(Some(KeyValue { key, text: value, flag: format!("--set {text}") }))
 }
 
 /// The keys for a terminal: name, default, what it does, values.

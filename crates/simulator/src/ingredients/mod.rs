@@ -12,7 +12,7 @@ mod law;
 mod variants;
 
 pub use keys::Effect;
-pub(crate) use keys::{Given, KEYS, Part, setting, table};
+pub(crate) use keys::{KEYS, KeyValue, Part, setting, table};
 pub use law::Law;
 pub use variants::{Variant, of_quality, realistic, variants};
 

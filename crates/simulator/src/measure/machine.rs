@@ -6,7 +6,7 @@
 //! [`Machine::default`].
 
 use crate::ingredients::Ingredients;
-use crate::measure::Wanted;
+use crate::measure::PlannedParts;
 use crate::run::clock::Clock;
 use crate::tissue_class::TissueClass;
 use std::f32::consts::TAU;
@@ -30,7 +30,7 @@ const PIXELS: u32 = 160;
 
 /// Measures this machine. `device_draws`: whether a graphics card draws; tissue is stepped with
 /// these ingredients, on one thread.
-pub fn machine(wanted: Wanted, device_draws: bool, ingredients: &Ingredients) -> Machine {
+pub fn machine(wanted: PlannedParts, device_draws: bool, ingredients: &Ingredients) -> Machine {
     let (clock, usual) = (Clock::start(), Machine::default());
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
     Machine {
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn parts_that_are_not_wanted_are_not_measured() {
         let usual = Machine::default();
-        let machine = machine(Wanted { bone: true, tissue: false, picture: true }, true, &Ingredients::default());
+        let machine = machine(PlannedParts { bone: true, tissue: false, picture: true }, true, &Ingredients::default());
         assert_eq!((machine.ns_per_tet_step, machine.ns_per_ray), (usual.ns_per_tet_step, usual.ns_per_ray));
         assert!(machine.us_per_rigid_tick > 0.0 && machine.us_per_rigid_tick != usual.us_per_rigid_tick);
     }

@@ -24,9 +24,9 @@ pub struct Parts<T> {
 }
 
 /// Which parts a plan chooses.
-pub type Wanted = Parts<bool>;
+pub type PlannedParts = Parts<bool>;
 
-impl Wanted {
+impl PlannedParts {
     /// Whether any part is wanted.
     pub fn any(self) -> bool {
         self.bone || self.tissue || self.picture

@@ -24,7 +24,7 @@ pub use describe::{ModelSummary, TissueSummary};
 use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::ingredients::{Element, Ingredients};
-use crate::measure::{self, CaseErrors, Parts, Wanted};
+use crate::measure::{self, CaseErrors, Parts, PlannedParts};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
@@ -153,7 +153,7 @@ impl ModelRequest {
         let preset = self.quality.map_or(Some(usual), Quality::preset);
         let auto = preset.is_none();
         let Ingredients { rigid, solver, .. } = given.ingredients;
-        let wanted = Wanted {
+        let wanted = PlannedParts {
             bone: auto && self.program.has_bone() && (given.spacing_mm.is_none() || rigid.is_none()),
             tissue: auto && self.program.has_tissue() && (given.tets.is_none() || solver.is_none()),
             picture: auto && self.picture.is_some(),
@@ -185,7 +185,7 @@ impl ModelRequest {
     fn plan(
         &self,
         facts: &Facts,
-        wanted: Wanted,
+        wanted: PlannedParts,
         device_draws: bool,
         case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, SessionError>,
     ) -> Result<(Plan, Parts<bool>), SessionError> {
@@ -254,7 +254,7 @@ impl ModelRequest {
     }
 
     /// Reasons for each part, and the unmet tolerances.
-    fn why(&self, plan: Option<&Plan>, wanted: Wanted, measured: Parts<bool>) -> (Parts<String>, Vec<String>) {
+    fn why(&self, plan: Option<&Plan>, wanted: PlannedParts, measured: Parts<bool>) -> (Parts<String>, Vec<String>) {
         let rest = match self.quality {
             None => "as recorded".into(),
             Some(Quality::Auto) => "as usual".into(),
@@ -314,7 +314,7 @@ pub(crate) fn usual() -> Setup {
 }
 
 /// Setup of a plan; the picture is the default unless it was planned.
-fn of_parts(plan: &Plan, wanted: Wanted, usual: Setup) -> Setup {
+fn of_parts(plan: &Plan, wanted: PlannedParts, usual: Setup) -> Setup {
     let planned = plan.setup();
     Setup { picture: if wanted.picture { planned.picture } else { usual.picture }, ..planned }
 }

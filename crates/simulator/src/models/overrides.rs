@@ -2,7 +2,7 @@
 
 use crate::config::{SessionConfig, Sizes};
 use crate::error::SessionError;
-use crate::ingredients::{Given, Ingredients, KEYS, Part};
+use crate::ingredients::{Ingredients, KEYS, KeyValue, Part};
 use crate::measure::Parts;
 use crate::options::Patient;
 use trepan_budget::{Bone, Picture, Tissue};
@@ -32,7 +32,7 @@ impl Overrides {
     }
 
     /// Adds the flags, which override all others.
-    pub fn with_flags(mut self, patient: &Patient, given: &[Given]) -> Result<Self, SessionError> {
+    pub fn with_flags(mut self, patient: &Patient, given: &[KeyValue]) -> Result<Self, SessionError> {
         let Patient { spacing_mm, tets, opening_refinement, .. } = *patient;
         self.spacing_mm = spacing_mm.map(written).or(self.spacing_mm);
         self.tets = tets.or(self.tets);
@@ -41,7 +41,7 @@ impl Overrides {
         self.words.bone.extend(spacing_mm.map(|mm| is_given(format!("--spacing-mm {mm}"))));
         self.words.tissue.extend(tets.map(|n| is_given(format!("--tets {n}"))));
         self.words.tissue.extend(opening_refinement.map(|n| is_given(format!("--opening-refinement {n}"))));
-        for Given { key, text, flag } in given {
+        for KeyValue { key, text, flag } in given {
             let set = key.set(&mut self.ingredients, text);
             set.map_err(|fault| SessionError::Usage(format!("{flag}: {fault}")))?;
             let words = if key.part == Part::Bone { &mut self.words.bone } else { &mut self.words.tissue };
@@ -64,10 +64,10 @@ impl Overrides {
     }
 
     /// Refuses an ingredient of `tled` for another solver.
-    fn check(&self, given: &[Given]) -> Result<(), SessionError> {
+    fn check(&self, given: &[KeyValue]) -> Result<(), SessionError> {
         let Some(rival) = self.ingredients.solver.and_then(trepan_soft::Method::named) else { return Ok(()) };
         let plain = Ingredients::default();
-        let differs = |given: &&Given| {
+        let differs = |given: &&KeyValue| {
             given.key.part == Part::Tled && given.key.value(&self.ingredients) != given.key.value(&plain)
         };
         match given.iter().find(differs).filter(|given| given.key.name != "still-mm") {

@@ -5,7 +5,7 @@
 //! show the same. Earlier sessions are those of the same person on the same case with the same
 //! lesson, or the same program without one.
 
-use crate::report::kept::Kept;
+use crate::report::kept::SessionFolder;
 use crate::training::{Lesson, Mark};
 use serde::Serialize;
 use serde_json::Value;
@@ -60,7 +60,7 @@ const CURVES: [usize; 3] = [2, 4, 6];
 
 impl Debrief {
     /// Makes the debriefing of a session from its summary and earlier ones, the newest first.
-    pub fn of(summary: &Value, lesson: Option<&Lesson>, earlier: &[Kept]) -> Self {
+    pub fn of(summary: &Value, lesson: Option<&Lesson>, earlier: &[SessionFolder]) -> Self {
         let usual = MEASURES.map(|(text, path, unit)| {
             let (text, path, unit) = (text.into(), path.into(), unit.into());
             Mark { text, path, unit, least: None, most: None }
@@ -94,7 +94,7 @@ fn named(mark: &Mark) -> String {
     if mark.unit.is_empty() { mark.text.clone() } else { format!("{}, {}", mark.text, mark.unit) }
 }
 
-fn row(mark: &Mark, summary: &Value, earlier: &[Kept]) -> Row {
+fn row(mark: &Mark, summary: &Value, earlier: &[SessionFolder]) -> Row {
     let value = mark.value(summary);
     let before: Vec<f64> = earlier.iter().filter_map(|kept| mark.value(&kept.summary)).collect();
     let mean = (!before.is_empty()).then(|| before.iter().sum::<f64>() / before.len() as f64);
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn a_lesson_is_passed_by_its_marks_and_compared_with_earlier_sessions() {
         let lesson = Lesson::all(None).remove(0);
-        let kept = |plunge_mm| Kept { summary: summary(plunge_mm, 1), ..Kept::default() };
+        let kept = |plunge_mm| SessionFolder { summary: summary(plunge_mm, 1), ..SessionFolder::default() };
         let debrief = Debrief::of(&summary(0.4, 0), Some(&lesson), &[kept(2.0), kept(3.0)]);
         assert_eq!((debrief.passed, debrief.earlier), (Some(true), 2));
         let plunge = debrief.rows.iter().find(|row| row.what.contains("plunge")).unwrap();

@@ -43,11 +43,11 @@ pub(crate) fn make(folder: &Path, out: &Path) -> Result<ExitCode, SessionError> 
 }
 
 /// A picture of the film and how long it is shown, ms.
-type Shown = (PathBuf, u16);
+type FilmPicture = (PathBuf, u16);
 
 /// Reads a list: the name of each picture, then its duration in seconds.
-fn pictures(list: &str, folder: &Path) -> Vec<Shown> {
-    let mut pictures: Vec<Shown> = Vec::new();
+fn pictures(list: &str, folder: &Path) -> Vec<FilmPicture> {
+    let mut pictures: Vec<FilmPicture> = Vec::new();
     for line in list.lines() {
         if let Some(name) = line.strip_prefix("file ") {
             pictures.push((folder.join(name.trim()), 33));
@@ -60,7 +60,7 @@ fn pictures(list: &str, folder: &Path) -> Vec<Shown> {
     pictures
 }
 
-fn animate(pictures: &[Shown], out: &mut impl Write) -> Result<(), SessionError> {
+fn animate(pictures: &[FilmPicture], out: &mut impl Write) -> Result<(), SessionError> {
     let failed = |fault: png::EncodingError| SessionError::Internal(format!("the film: {fault}"));
     let read = |path: &Path| {
         let image = fs::read(path).and_then(|bytes| Image::read_png(&bytes));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// A session in its folder.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Kept {
+pub(crate) struct SessionFolder {
     /// Its folder.
     pub folder: PathBuf,
     /// Date, time and name, as in the name of the folder.
@@ -30,7 +30,7 @@ const MOST: usize = 500;
 /// How deep below a folder sessions are looked for: program, batch, session.
 const MOST_DEEP: usize = 3;
 
-impl Kept {
+impl SessionFolder {
     /// Reads the session in a folder.
     pub fn of(folder: &Path) -> Option<Self> {
         let summary = serde_json::from_slice(&fs::read(folder.join("summary.json")).ok()?).ok()?;
@@ -134,17 +134,17 @@ mod tests {
             write(title, person, lesson);
         }
         fs::create_dir_all(home.path().join("integrated/half-written")).unwrap();
-        let all = Kept::list(&[home.path().into(), home.path().join("missing")]);
+        let all = SessionFolder::list(&[home.path().into(), home.path().join("missing")]);
         assert_eq!((all.len(), all[0].title.as_str()), (5, "2026-01-05T00-00-00-named"));
         let before: Vec<_> = all[0].before(&all).into_iter().map(|kept| kept.title).collect();
         assert_eq!(before, ["2026-01-03T00-00-00", "2026-01-01T00-00-00"]);
-        assert!(Kept { person: String::new(), ..all[0].clone() }.before(&all).is_empty(), "nobody was named");
+        assert!(SessionFolder { person: String::new(), ..all[0].clone() }.before(&all).is_empty(), "nobody was named");
         let same = [home.path().to_path_buf(), home.path().join("integrated/2026-01-02T00-00-00")];
-        assert_eq!((Kept::all(&same).len(), all[0].date().as_str()), (5, "2026-01-05T00:00:00Z"));
-        assert_eq!(Kept::with(Path::new("demo"), Value::Null).date(), "");
-        let elsewhere = Kept { case: "another head".into(), ..all[0].clone() };
+        assert_eq!((SessionFolder::all(&same).len(), all[0].date().as_str()), (5, "2026-01-05T00:00:00Z"));
+        assert_eq!(SessionFolder::with(Path::new("demo"), Value::Null).date(), "");
+        let elsewhere = SessionFolder { case: "another head".into(), ..all[0].clone() };
         assert!(elsewhere.before(&all).is_empty(), "another patient is another curve");
-        let copy = Kept { device: "watch".into(), ..all[0].clone() };
+        let copy = SessionFolder { device: "watch".into(), ..all[0].clone() };
         assert!(copy.before(&all).is_empty());
     }
 }

@@ -5,11 +5,11 @@
 //! its marks. Replays and watched sessions are left out: they are nobody's work.
 
 use crate::error::SessionError;
-use crate::options::Wanted;
+use crate::options::SessionFilter;
 use crate::printable::{columns, count, printable};
 use crate::report::csv;
 use crate::report::debrief::Debrief;
-use crate::report::kept::Kept;
+use crate::report::kept::SessionFolder;
 use crate::settings::{Recent, Settings, sessions};
 use crate::training::Lesson;
 use crate::whole::whole;
@@ -46,11 +46,11 @@ pub(crate) struct SessionRow {
 }
 
 /// Makes the rows of the table, in the order given. `recent` has the users' names of cases.
-pub(crate) fn rows(kept: &[Kept], lessons: &[Lesson], recent: &[Recent]) -> Vec<SessionRow> {
+pub(crate) fn rows(kept: &[SessionFolder], lessons: &[Lesson], recent: &[Recent]) -> Vec<SessionRow> {
     kept.iter().filter(|kept| !kept.is_copy()).map(|kept| row(kept, lessons, recent)).collect()
 }
 
-fn row(kept: &Kept, lessons: &[Lesson], recent: &[Recent]) -> SessionRow {
+fn row(kept: &SessionFolder, lessons: &[Lesson], recent: &[Recent]) -> SessionRow {
     let number = |path: &str| at(&kept.summary, path).as_f64();
     let lesson = lessons.iter().find(|lesson| lesson.name == kept.lesson);
     let hash = at(&kept.summary, "hashes.case").as_str().filter(|hash| !hash.is_empty());
@@ -97,13 +97,13 @@ fn table(rows: &[SessionRow]) -> String {
     columns([HEADINGS.map(String::from)].into_iter().chain(rows.iter().map(SessionRow::cells)))
 }
 
-impl Wanted {
+impl SessionFilter {
     fn folders(&self) -> Vec<PathBuf> {
         let usual = || vec![sessions(), PathBuf::from("trepan-out")];
         if self.folders.is_empty() { usual() } else { self.folders.clone() }
     }
 
-    fn takes(&self, kept: &Kept, row: &SessionRow) -> bool {
+    fn takes(&self, kept: &SessionFolder, row: &SessionRow) -> bool {
         let low = |text: &str| text.trim().to_lowercase();
         let is = |wanted: &Option<String>, names: &[&str]| {
             wanted.as_ref().is_none_or(|wanted| names.iter().any(|name| low(name) == low(wanted)))
@@ -115,9 +115,9 @@ impl Wanted {
     }
 
     /// The sessions that are wanted, the newest first.
-    fn find(&self) -> Vec<(Kept, SessionRow)> {
+    fn find(&self) -> Vec<(SessionFolder, SessionRow)> {
         let (lessons, recent) = (Lesson::all(Lesson::folder().as_deref()), Settings::read().recent);
-        let all = Kept::all(&self.folders());
+        let all = SessionFolder::all(&self.folders());
         let rows = rows(&all, &lessons, &recent);
         let all = all.into_iter().filter(|kept| !kept.is_copy());
         all.zip(rows).filter(|(kept, row)| self.takes(kept, row)).collect()
@@ -125,7 +125,7 @@ impl Wanted {
 }
 
 /// Prints the sessions as a table.
-pub(crate) fn list(wanted: &Wanted) -> Result<ExitCode, SessionError> {
+pub(crate) fn list(wanted: &SessionFilter) -> Result<ExitCode, SessionError> {
     let rows: Vec<SessionRow> = wanted.find().into_iter().map(|(_, row)| row).collect();
     if !rows.is_empty() {
         print!("{}", table(&rows));
@@ -134,13 +134,13 @@ pub(crate) fn list(wanted: &Wanted) -> Result<ExitCode, SessionError> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn in_folders(number: usize, wanted: &Wanted) -> String {
+fn in_folders(number: usize, wanted: &SessionFilter) -> String {
     let folders: Vec<String> = wanted.folders().iter().map(|folder| folder.display().to_string()).collect();
     printable(&format!("{} in {}", count(number, "session"), folders.join(", ")))
 }
 
 /// Writes one row per session to a CSV file, with every number of its scores.
-pub(crate) fn export(wanted: &Wanted, file: &Path) -> Result<ExitCode, SessionError> {
+pub(crate) fn export(wanted: &SessionFilter, file: &Path) -> Result<ExitCode, SessionError> {
     if file.exists() {
         return Err(SessionError::Usage(format!("{} exists already: name a file that does not", file.display())));
     }
@@ -156,7 +156,7 @@ pub(crate) fn export(wanted: &Wanted, file: &Path) -> Result<ExitCode, SessionEr
 /// Parts of a summary whose numbers are exported.
 const PARTS: [&str; 4] = ["scores", "plan", "cut_off", "force_n"];
 
-fn text(found: &[(Kept, SessionRow)]) -> String {
+fn text(found: &[(SessionFolder, SessionRow)]) -> String {
     let numbers: Vec<BTreeMap<String, String>> = found.iter().map(|(kept, _)| numbers(&kept.summary)).collect();
     let keys: BTreeSet<&String> = numbers.iter().flat_map(BTreeMap::keys).collect();
     let about = ["date_utc", "person", "program", "version", "case", "case_hash", "lesson", "name", "device", "passed"];
@@ -202,13 +202,13 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn kept(person: &str, device: &str, dice: f64) -> Kept {
+    fn kept(person: &str, device: &str, dice: f64) -> SessionFolder {
         let summary = json!({
             "app": "integrated", "case": "case-1a2b", "person": person, "lesson": "through", "device": device,
             "date": "2026-03-04T05:06:07Z", "version": "0.3.0", "length_s": 61.5, "hashes": { "case": "1a2b" },
             "plan": { "dice": dice }, "scores": { "plunge_mm": 1.25, "new_key_n": 2 }, "warnings": [{}, {}],
         });
-        Kept::with(Path::new("kept/integrated/one"), summary)
+        SessionFolder::with(Path::new("kept/integrated/one"), summary)
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
         let row = row(&kept, &lessons, &[]);
         let takes = |person: Option<&str>, lesson: Option<&str>, case: Option<&str>| {
             let [person, lesson, case] = [person, lesson, case].map(|text| text.map(String::from));
-            Wanted { person, lesson, case, ..Wanted::default() }.takes(&kept, &row)
+            SessionFilter { person, lesson, case, ..SessionFilter::default() }.takes(&kept, &row)
         };
         assert!(takes(None, None, None) && takes(Some(" ada"), Some("through"), Some("1A2B")));
         assert!(takes(None, Some(&row.lesson), None), "by title");

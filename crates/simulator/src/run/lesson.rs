@@ -77,12 +77,12 @@ impl Listener {
 }
 
 /// A device whose buttons are changed by the teacher's requests.
-pub(crate) struct Taught {
+pub(crate) struct TeacherButtons {
     device: Box<dyn HapticDevice>,
     teacher: Reader<TeacherRecord>,
 }
 
-impl Taught {
+impl TeacherButtons {
     /// Wraps a device.
     pub fn new(device: Box<dyn HapticDevice>, teacher: Reader<TeacherRecord>) -> Self {
         Self { device, teacher }
@@ -101,7 +101,7 @@ fn allowed(buttons: Buttons, flags: u32) -> Buttons {
     }
 }
 
-impl HapticDevice for Taught {
+impl HapticDevice for TeacherButtons {
     fn read(&mut self, time_ms: f64) -> Reading {
         let mut reading = self.device.read(time_ms);
         reading.tool.buttons = allowed(reading.tool.buttons, self.teacher.latest().0.flags);
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn a_pause_suppresses_all_other_buttons_and_no_device_can_request_one() {
         let (mut writer, reader) = cell(TeacherRecord::default());
-        let mut hand = Taught::new(Box::new(AllPressed), reader);
+        let mut hand = TeacherButtons::new(Box::new(AllPressed), reader);
         let mut pressed = |flags| {
             writer.set(TeacherRecord { flags, ..TeacherRecord::default() });
             hand.read(1.0).tool.buttons

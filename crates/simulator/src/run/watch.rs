@@ -63,12 +63,12 @@ pub(crate) struct Share {
 }
 
 /// Readers of the teacher's requests: first hand, second hand, window.
-pub(crate) type Asked = [Reader<TeacherRecord>; 3];
+pub(crate) type TeacherRequests = [Reader<TeacherRecord>; 3];
 
 impl Share {
     /// Shares a session under a name; returns also the readers of the teacher's requests.
-    pub fn open(name: &str, header: &SessionHeader) -> Result<(Self, Asked), SessionError> {
-        let open = || -> Result<(Self, Asked), TopicError> {
+    pub fn open(name: &str, header: &SessionHeader) -> Result<(Self, TeacherRequests), SessionError> {
+        let open = || -> Result<(Self, TeacherRequests), TopicError> {
             let session = Session::join(name)?;
             let (teacher, readers) = Listener::join(&session)?;
             let (ticks, events, mut headers) = (session.publisher()?, session.publisher()?, session.publisher()?);
@@ -191,7 +191,7 @@ impl HapticDevice for Watched {
 
 /// Connections of a session's window to other sessions.
 #[derive(Default)]
-pub(crate) struct Company {
+pub(crate) struct PeerSession {
     /// Requests of a teacher to this session's trainee.
     pub asked: Option<Reader<TeacherRecord>>,
     /// Send end, where this session teaches the trainee of another.

@@ -15,7 +15,7 @@ use crate::run::lockstep::up_to;
 use crate::run::stop::Stop;
 use crate::show::notice_text::NEWS_MS;
 use crate::show::picture::Album;
-use crate::show::window::{self, Opened, Shown};
+use crate::show::window::{self, SessionView, ViewState};
 use crate::stages::second_hand::SecondView;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -114,7 +114,7 @@ struct Player {
     first: View,
     recording: Arc<Recording>,
     program: Program,
-    shown: Shown,
+    shown: ViewState,
     hint: String,
     /// Time at which the window closes, s.
     until_s: f64,
@@ -125,7 +125,7 @@ pub(crate) fn show(
     first: View,
     coming: Receiver<Shot>,
     painter: Painter,
-    opened: &Opened<'_>,
+    opened: &SessionView<'_>,
     recording: &Arc<Recording>,
     until_s: f64,
     stop: &Stop,
@@ -138,7 +138,7 @@ pub(crate) fn show(
         first,
         recording: recording.clone(),
         program: opened.table.program,
-        shown: Shown::of(opened, bone.is_some(), stop),
+        shown: ViewState::of(opened, bone.is_some(), stop),
         hint: recording.losses().map_or_else(|| HINT.into(), |losses| format!("not a whole recording: {losses}")),
         until_s,
         film: Film { shots: Vec::new(), coming, bone, at: 0, rest, positions: Vec::new() },

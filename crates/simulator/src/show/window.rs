@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use crate::report::page::Shot;
 use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
 use crate::run::stop::Stop;
-use crate::run::watch::{Company, Watching};
+use crate::run::watch::{PeerSession, Watching};
 use crate::run::{RenderInputs, View};
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
@@ -37,7 +37,7 @@ const NEAR_MM: f32 = 25.0;
 const REQUEST_S: f64 = 0.1;
 
 /// Session data for the window.
-pub(crate) struct Opened<'a> {
+pub(crate) struct SessionView<'a> {
     /// The window.
     pub stage: &'a Stage,
     /// Progress of loading, which ends when the session is in the window.
@@ -59,7 +59,7 @@ pub(crate) struct Opened<'a> {
 }
 
 /// What a live session and a replay show alike.
-pub(super) struct Shown {
+pub(super) struct ViewState {
     case: String,
     program: Program,
     /// Whether bone is shown.
@@ -72,9 +72,9 @@ pub(super) struct Shown {
     pub stop: Stop,
 }
 
-impl Shown {
+impl ViewState {
     /// Prepares what is shown of a session.
-    pub fn of(opened: &Opened<'_>, bone: bool, stop: &Stop) -> Self {
+    pub fn of(opened: &SessionView<'_>, bone: bool, stop: &Stop) -> Self {
         Self {
             case: opened.case.into(),
             program: opened.table.program,
@@ -122,10 +122,10 @@ struct Show {
     inputs: RenderInputs,
     view: View,
     positions: Vec<Vec3>,
-    shown: Shown,
+    shown: ViewState,
     wanted_rate_hz: f32,
     pointer: Option<MouseHandle>,
-    company: Company,
+    company: PeerSession,
     /// Markers on the anatomy, mm.
     markers: Vec<Vec3>,
     /// Pose of the teacher's ghost tool.
@@ -184,9 +184,9 @@ impl Rate {
 pub(crate) fn show(
     mut inputs: RenderInputs,
     painter: Painter,
-    opened: &Opened<'_>,
+    opened: &SessionView<'_>,
     pointer: Option<MouseHandle>,
-    company: Company,
+    company: PeerSession,
     stop: &Stop,
 ) -> Album {
     let view = *inputs.view.latest().0;
@@ -194,7 +194,7 @@ pub(crate) fn show(
         inputs,
         view,
         positions: Vec::new(),
-        shown: Shown::of(opened, opened.table.bone().is_some(), stop),
+        shown: ViewState::of(opened, opened.table.bone().is_some(), stop),
         wanted_rate_hz: opened.rate_hz,
         pointer,
         company,
@@ -215,7 +215,7 @@ pub(crate) fn show(
 pub(crate) fn run<S: window::Session + Send>(
     session: S,
     mut painter: Painter,
-    opened: &Opened<'_>,
+    opened: &SessionView<'_>,
     at: View,
 ) -> (S, Album) {
     let (mut album, folder) = (Album::default(), opened.out.join("frames"));
@@ -355,8 +355,8 @@ impl Show {
     /// Exchanges the teacher's requests for this picture; updates ghost and markers.
     fn exchange_requests(&mut self, input: &WindowInput) -> Lesson {
         let (lesson, requests) = match &mut self.company {
-            Company { teacher: Some(teacher), .. } => (teach(teacher, input), *teacher.requests()),
-            Company { asked: Some(asked), .. } => {
+            PeerSession { teacher: Some(teacher), .. } => (teach(teacher, input), *teacher.requests()),
+            PeerSession { asked: Some(asked), .. } => {
                 let requests = *asked.latest().0;
                 (Lesson::requested(requests.flags), requests)
             }
@@ -447,7 +447,7 @@ mod tests {
             view: View::at(sample, 1.0),
             inputs: RenderInputs { view, soft: None, film: None },
             positions: Vec::new(),
-            shown: Shown {
+            shown: ViewState {
                 case: "case".into(),
                 program: Program::Brain,
                 bone: false,
@@ -458,7 +458,7 @@ mod tests {
             },
             wanted_rate_hz: 1000.0,
             pointer: None,
-            company: Company { watching: Some(watching), ..Company::default() },
+            company: PeerSession { watching: Some(watching), ..PeerSession::default() },
             markers: Vec::new(),
             ghost: None,
             requests: Requests::default(),

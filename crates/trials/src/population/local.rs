@@ -70,17 +70,17 @@ impl Local {
     }
 
     /// Maps a point of the head to the base.
-    pub fn place(&self, point: DVec3) -> Flown {
+    pub fn place(&self, point: DVec3) -> FlowedPoint {
         let intact = self.intact.end(point.as_vec3());
         match &self.with_atrophy {
-            Some(flow) => Flown { base: flow.end(point.as_vec3()), intact: Some(intact) },
-            None => Flown { base: intact, intact: None },
+            Some(flow) => FlowedPoint { base: flow.end(point.as_vec3()), intact: Some(intact) },
+            None => FlowedPoint { base: intact, intact: None },
         }
     }
 }
 
 /// Position of a point after the flow.
-pub struct Flown {
+pub struct FlowedPoint {
     /// Point in the base.
     pub base: Vec3,
     /// Point in the base without atrophy, if the recipe has any.

@@ -128,7 +128,7 @@ fn calls(rounds: usize) -> Vec<Samples> {
 
 /// Measurements of a pressing hand.
 #[derive(Clone, Copy, Default)]
-pub struct Held {
+pub struct PressingHand {
     error_n: f64,
     /// How far the hand still moves at the end, mm.
     pub cycle_mm: f32,
@@ -153,13 +153,13 @@ pub struct Press {
     pub hand: HandModel,
 }
 
-fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>) -> Held {
+fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>) -> PressingHand {
     press_into(model, &Press { stiffness, delay_ticks, thick_mm, tick_ms: 1.0, hand: HandModel::LIGHT }, |_| ())
 }
 
 /// Presses a hand into a wall at x ≤ 0 and holds it there. `record` gets the handle's x at every
 /// tick, mm.
-pub fn press_into(model: &Model, press: &Press, mut record: impl FnMut(f32)) -> Held {
+pub fn press_into(model: &Model, press: &Press, mut record: impl FnMut(f32)) -> PressingHand {
     let Press { stiffness, delay_ticks, thick_mm, tick_ms, hand } = *press;
     let goal = thick_mm.map_or(MEANT_MM, |thick| thick + 2.0);
     let intent = (0..TICKS).map(|tick| at((2.0 - 0.05 * tick_ms * tick as f32).max(-goal))).collect();
@@ -168,7 +168,8 @@ pub fn press_into(model: &Model, press: &Press, mut record: impl FnMut(f32)) -> 
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity: None, ..GuardConfig::default() });
     let (mut force, mut proxy) = ((model.make)(stiffness), GodObject::new(Vec3::X * 2.0));
     let truth = stiffness * hand.stiffness / (stiffness + hand.stiffness) * goal;
-    let (mut squares, mut way, mut held) = (0.0f64, (f32::MAX, f32::MIN), Held { finite: true, ..Held::default() });
+    let (mut squares, mut way, mut held) =
+        (0.0f64, (f32::MAX, f32::MIN), PressingHand { finite: true, ..PressingHand::default() });
     for tick in 0..TICKS {
         let tool = device.read(tick as f64 * f64::from(tick_ms)).tool;
         let touch = if model.proxy { by_proxy(&mut proxy, tool.tip()) } else { nearest(tool.tip().x, thick_mm) };
@@ -232,7 +233,7 @@ fn endure(findings: &mut Findings) {
     conditions::judge("Force models", &names, &models(), |at, model| CONDITIONS[at].1(model), findings);
 }
 
-fn quiet(held: &Held) -> Outcome {
+fn quiet(held: &PressingHand) -> Outcome {
     match held.cycle_mm {
         _ if !held.finite => Outcome::Fails("not a number".into()),
         cycle if cycle <= QUIET_MM => Outcome::Works,
@@ -241,7 +242,7 @@ fn quiet(held: &Held) -> Outcome {
     }
 }
 
-fn held_back(held: &Held) -> Outcome {
+fn held_back(held: &PressingHand) -> Outcome {
     if held.inward_n > 1e-3 { Outcome::Fails("pushes on through the wall".into()) } else { quiet(held) }
 }
 

@@ -1,6 +1,6 @@
 //! Pictures of the opening during a run, as a session without a window draws them.
 
-use crate::suites::scripted::Shown;
+use crate::suites::scripted::LookInput;
 use anyhow::{Result, anyhow};
 use trepan_render::{Frame, Image, Painter, RenderError, SceneData, SliceLook};
 
@@ -24,7 +24,7 @@ impl Pictures {
     }
 
     /// Takes a picture if one is due.
-    pub fn watch(&mut self, shown: &Shown<'_>) {
+    pub fn watch(&mut self, shown: &LookInput<'_>) {
         if !shown.ms.is_multiple_of(self.every_ms) {
             return;
         }
@@ -35,7 +35,7 @@ impl Pictures {
         }
     }
 
-    fn draw(&mut self, shown: &Shown<'_>) -> Result<Image, RenderError> {
+    fn draw(&mut self, shown: &LookInput<'_>) -> Result<Image, RenderError> {
         let scene = shown.session.scene();
         let brain = scene.brain.as_ref();
         let painter = match &mut self.painter {

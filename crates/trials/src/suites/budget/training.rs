@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, FEATURES, Kind, Picture, PowerLaw, Quality, Row, Tissue, write};
 use trepan_simulator::Ingredients;
 use trepan_simulator::measure::tissue::{self, Brains, Fineness, Push};
-use trepan_simulator::measure::{self, Wanted, bone, picture};
+use trepan_simulator::measure::{self, PlannedParts, bone, picture};
 
 /// Random numbers of training: far from those of the scenes that are judged.
 const SEED: u64 = 0x7472_6169_6e00;
@@ -29,7 +29,7 @@ const COVERED: f64 = 0.95;
 
 /// One scene's features, and error and cost of every choice.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Seen {
+pub struct SceneErrors {
     features: [f64; FEATURES],
     errors: Vec<f64>,
     costs: Vec<f64>,
@@ -38,9 +38,9 @@ pub struct Seen {
 /// What a part of training found.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Observed {
-    bone: Vec<Seen>,
-    tissue: Vec<Seen>,
-    picture: Vec<Seen>,
+    bone: Vec<SceneErrors>,
+    tissue: Vec<SceneErrors>,
+    picture: Vec<SceneErrors>,
 }
 
 /// How many parts there are.
@@ -64,7 +64,7 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
         let scene = &situation.scene;
         let on_bone = || {
             let found = stretch.measure(&bones);
-            Seen {
+            SceneErrors {
                 features: scene.bone_features(),
                 errors: found.iter().map(|found| found.error_n / scene.stiffness).collect(),
                 costs: found.iter().map(|found| found.tick_us / unit_us).collect(),
@@ -73,7 +73,7 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
         let drawn = || {
             let found = situation.views(&case)[0].measure(&pictures, 1).expect("the view has pixels");
             let unit_us = found.last().expect("there are choices").us;
-            Seen {
+            SceneErrors {
                 features: scene.picture_features(),
                 errors: found.iter().map(|found| found.error_percent).collect(),
                 costs: found.iter().map(|found| found.us / unit_us).collect(),
@@ -88,14 +88,14 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
 
 /// A tick as a machine is measured, µs.
 fn unit_us() -> f64 {
-    let wanted = Wanted { bone: true, tissue: false, picture: false };
+    let wanted = PlannedParts { bone: true, tissue: false, picture: false };
     measure::machine(wanted, false, &Ingredients::default()).us_per_rigid_tick
 }
 
-fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &Brains) -> Seen {
+fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &Brains) -> SceneErrors {
     let push = Push::of(&situation.push(case), brains, Fineness::JUDGE);
     let found = push.and_then(|push| push.measure(brains)).expect("the brain is sound");
-    Seen {
+    SceneErrors {
         features: situation.scene.tissue_features(),
         errors: found.iter().map(|found| found.error_mm).collect(),
         costs: (0..choices.len()).map(|at| tissue::cost(at, choices, &found, &situation.scene)).collect(),
@@ -107,7 +107,7 @@ pub const TABLES: [&str; 3] = [Bone::TABLE, Tissue::TABLE, Picture::TABLE];
 
 /// The tables of which the parts saw anything: name and text.
 pub fn tables(parts: &[Observed]) -> Vec<(&'static str, String)> {
-    let of = |kind: fn(&Observed) -> &Vec<Seen>| parts.iter().flat_map(kind).collect::<Vec<_>>();
+    let of = |kind: fn(&Observed) -> &Vec<SceneErrors>| parts.iter().flat_map(kind).collect::<Vec<_>>();
     let pictures = picture::choices().into_iter().filter(|p| !p.sparse && p.detail == 1.0).collect::<Vec<_>>();
     let exact = |row: Row<Picture>| {
         let error = if pictures.contains(&row.what) { PowerLaw::constant(0.0) } else { row.error };
@@ -126,8 +126,8 @@ fn table<T: Kind>(rows: &[Row<T>]) -> Option<(&'static str, String)> {
 }
 
 /// The laws of every choice; one that could not be run in all scenes is left out.
-fn rows<T: Kind>(choices: &[T], seen: &[&Seen], covered: f64) -> Vec<Row<T>> {
-    let fit = |of: &dyn Fn(&Seen) -> f64| {
+fn rows<T: Kind>(choices: &[T], seen: &[&SceneErrors], covered: f64) -> Vec<Row<T>> {
+    let fit = |of: &dyn Fn(&SceneErrors) -> f64| {
         PowerLaw::fit(&seen.iter().map(|seen| (seen.features, of(seen))).collect::<Vec<_>>(), covered)
     };
     let row = |(n, what): (usize, &T)| {

@@ -48,7 +48,7 @@ fn brain(tets: usize) -> (Body, Vec3) {
 
 /// Steps for some ms of the clock under a press that moves; returns ms of tissue a ms, and the
 /// what the calls took.
-fn run_for(ms: f64, solver: &mut dyn SoftSolver, (body, top): (&Body, Vec3)) -> Ran {
+fn run_for(ms: f64, solver: &mut dyn SoftSolver, (body, top): (&Body, Vec3)) -> SteppingTime {
     let mut spring = pressed(body, top, 1)[0];
     let held = spring.mean(|n| body.mesh.positions[n as usize]).dot(spring.normal);
     let start = Instant::now();
@@ -65,7 +65,7 @@ fn run_for(ms: f64, solver: &mut dyn SoftSolver, (body, top): (&Body, Vec3)) -> 
         substeps += report.substeps;
         faults += u64::from(report.inverted + report.limited + report.non_finite);
     }
-    Ran {
+    SteppingTime {
         share: tissue_ms / (start.elapsed().as_secs_f64() * 1e3),
         calls: times.into(),
         substeps_per_ms: f64::from(substeps) / tissue_ms,
@@ -74,7 +74,7 @@ fn run_for(ms: f64, solver: &mut dyn SoftSolver, (body, top): (&Body, Vec3)) -> 
 }
 
 /// What a time of stepping was like.
-struct Ran {
+struct SteppingTime {
     /// Ms of tissue in a ms of the clock.
     share: f64,
     calls: Samples,

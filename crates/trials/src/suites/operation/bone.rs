@@ -41,7 +41,7 @@ fn last_cut_ms(scope: Scope, path: &Script) -> u64 {
 }
 
 /// What the hand feels at each tick: from the device to where the tool is held, mm.
-pub struct Felt {
+pub struct ProxyOffsets {
     /// At each tick.
     pub lifted: Vec<DVec3>,
     /// Whether the burr works.
@@ -58,7 +58,7 @@ pub struct BoneErrors {
     normal_deg: Vec<f64>,
 }
 
-impl Felt {
+impl ProxyOffsets {
     /// What a run of the operation felt.
     pub fn of(lifted: &[Vec3]) -> Self {
         Self { lifted: lifted.iter().map(|v| v.as_dvec3()).collect(), drilling: Vec::new() }
@@ -139,11 +139,11 @@ impl BoneErrors {
 }
 
 /// The truth of the built-in case along the plan at a site.
-pub fn truth(scope: Scope, site: &Site) -> Result<Felt> {
+pub fn truth(scope: Scope, site: &Site) -> Result<ProxyOffsets> {
     let (ct, isovalue) = rigid::head();
     let scan = Scan::around(&ct, isovalue, site.entry.as_dvec3(), AROUND_MM);
     let path = path(scope, site)?;
-    Ok(Felt::exact(scan, &path, last_cut_ms(scope, &path), 1))
+    Ok(ProxyOffsets::exact(scan, &path, last_cut_ms(scope, &path), 1))
 }
 
 /// Splits the error of force while the burr works: one thing at a time is not exact.
@@ -156,17 +156,18 @@ pub fn budget(scope: Scope, findings: &mut Findings) {
     let (ct, isovalue) = rigid::head();
     let until = last_cut_ms(scope, &path);
     let around = |ct: &VoxelVolume<i16>| Scan::around(ct, isovalue, site.entry.as_dvec3(), AROUND_MM);
-    let truth = Felt::exact(around(&ct), &path, until, 1);
-    let row = |what: &str, felt: &Felt, truth: &Felt| {
+    let truth = ProxyOffsets::exact(around(&ct), &path, until, 1);
+    let row = |what: &str, felt: &ProxyOffsets, truth: &ProxyOffsets| {
         let row = Row::new("error budget of drilling", what);
         felt.against(truth).named().into_iter().fold(row, |row, (name, value)| row.metric(name, value))
     };
-    let mut rows = vec![row("time step: half a ms against 1 ms", &Felt::exact(around(&ct), &path, until, 2), &truth)];
+    let mut rows =
+        vec![row("time step: half a ms against 1 ms", &ProxyOffsets::exact(around(&ct), &path, until, 2), &truth)];
     for &spacing_mm in scope.pick(&[0.75f32][..], &[1.0, 0.75, 0.5]) {
         let mut skull = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Cubic, AIR_HU);
         skull_only(&mut skull, isovalue);
-        let exact = Felt::exact(around(&skull), &path, until, 1);
-        let method = Felt::by_method(&skull, isovalue, &path, until);
+        let exact = ProxyOffsets::exact(around(&skull), &path, until, 1);
+        let method = ProxyOffsets::by_method(&skull, isovalue, &path, until);
         rows.push(row(&format!("resampling to {spacing_mm} mm, else exact"), &exact, &truth));
         rows.push(row(&format!("cut and law on voxels of {spacing_mm} mm, against exact ones there"), &method, &exact));
         rows.push(row(&format!("all of it on voxels of {spacing_mm} mm"), &method, &truth));

@@ -26,7 +26,7 @@ mod setups;
 use super::scripted::{Prepared, Ride, worst};
 use super::{Part, Scope};
 use anyhow::{Result, anyhow, ensure};
-use bone::Felt;
+use bone::ProxyOffsets;
 use error::Errors;
 use setups::Candidate;
 use std::sync::Mutex;
@@ -140,7 +140,7 @@ fn of_brain(scene: &str, name: &str, ride: &Ride, truth: &Ride) -> Row {
 }
 
 /// The finest run of this process: every part needs it, and it is the same for all.
-static TRUTH: Mutex<Option<(Scope, Ride, Felt)>> = Mutex::new(None);
+static TRUTH: Mutex<Option<(Scope, Ride, ProxyOffsets)>> = Mutex::new(None);
 
 fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let mut kept = TRUTH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -154,7 +154,7 @@ fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let ride = Prepared::open(scope, candidate.flags, Some(truth.site))?.run(&mut |_| {})?;
     let errors = Errors::between(&ride, truth);
     let per_s = |seconds: f64| seconds / ride.seconds;
-    let on_bone = Felt::of(&ride.lifted).against(felt).named();
+    let on_bone = ProxyOffsets::of(&ride.lifted).against(felt).named();
     let bone_p95_n =
         on_bone.iter().find(|(name, _)| *name == "bone_force_error_p95_n").map_or(f64::NAN, |found| found.1);
     let allowed = Scene::default();

@@ -206,7 +206,7 @@ fn piece(ct: &VoxelVolume<i16>, site: &Site) -> VoxelVolume<i16> {
 }
 
 /// A tool that a method holds, in bone of its own.
-struct Held {
+struct HeldTool {
     bone: BoneVolume,
     contact: Box<dyn RigidContact>,
     out: RigidStep,
@@ -215,7 +215,7 @@ struct Held {
     times_us: Vec<f64>,
 }
 
-impl Held {
+impl HeldTool {
     fn by(
         method: &Method,
         piece: &VoxelVolume<i16>,
@@ -247,7 +247,7 @@ fn row(
     (radius_mm, task): (f32, Task),
     truth: &[Tick],
 ) -> Row {
-    let held = || Held::by(method, piece, isovalue, (radius_mm, site.outward, truth[0].device));
+    let held = || HeldTool::by(method, piece, isovalue, (radius_mm, site.outward, truth[0].device));
     let (mut first, mut second) = (held(), held());
     let led = led(truth, |device, works| first.hold(device, works));
     let own = hand(site, task, radius_mm, |device, works| second.hold(device, works));

@@ -119,12 +119,12 @@ impl Model {
 }
 
 /// What one tick felt.
-struct Felt {
+struct TickResult {
     tip: Vec3,
     depth_mm: f32,
 }
 
-impl Felt {
+impl TickResult {
     /// Error of the depth on a cube, voxels. It counts where the truth is a touch of 0.2 mm or more
     /// and the centre is out of the cube.
     fn error_voxel(&self, voxel_mm: f32) -> Option<f64> {
@@ -138,7 +138,7 @@ impl Felt {
 /// A path, ridden.
 pub(super) struct Ride {
     tick_us: Samples,
-    felt: Vec<Felt>,
+    felt: Vec<TickResult>,
     points: u64,
     voxels_in_contact: u32,
     voxels: u64,
@@ -188,7 +188,7 @@ fn ride(method: &Method, bone: &BoneVolume, path: &[ToolState], look: bool) -> R
         if look && tick % LOOK == 0 {
             ride.clearance_voxel.extend(clearance::error_voxel(bone, tool.tip(), &out.manifold));
         }
-        ride.felt.push(Felt { tip: tool.tip(), depth_mm: out.manifold.depth_mm });
+        ride.felt.push(TickResult { tip: tool.tip(), depth_mm: out.manifold.depth_mm });
     }
     ride.tick_us = Samples::from(times);
     ride

@@ -13,7 +13,7 @@ mod ride;
 pub mod surface;
 
 pub use distance::surfaces;
-pub use ride::{Prepared, Ride, Shown};
+pub use ride::{LookInput, Prepared, Ride};
 
 use super::Scope;
 use anyhow::Result;

@@ -72,7 +72,7 @@ impl Ride {
 }
 
 /// What is shown at one look.
-pub struct Shown<'a> {
+pub struct LookInput<'a> {
     /// The session, with the bone as it is drilled.
     pub session: &'a Session,
     /// Time of the operation, ms.
@@ -121,7 +121,7 @@ impl Prepared {
     }
 
     /// Runs the operation; `watch` sees it every [`LOOK_MS`].
-    pub fn run(self, watch: &mut dyn FnMut(&Shown<'_>)) -> Result<Ride> {
+    pub fn run(self, watch: &mut dyn FnMut(&LookInput<'_>)) -> Result<Ride> {
         let Self { session, stages, site, path, milliseconds, before_mb } = self;
         let skull = session.scene().bone.as_ref().context("the built-in case has a skull")?;
         let brain = session.scene().brain.as_ref().context("the built-in case has a brain")?;
@@ -146,7 +146,7 @@ impl Prepared {
             memory_mb: 0.0,
         };
         let mut look = |ms: u64, sample: &ToolSample, positions: &[Vec3]| {
-            watch(&Shown { session: &session, ms, sample, positions });
+            watch(&LookInput { session: &session, ms, sample, positions });
             rays.look(positions)
         };
         run(stages, milliseconds, &path, &mut look, &mut ride);

@@ -216,17 +216,17 @@ fn brains(scope: Scope, findings: &mut Findings) {
 }
 
 /// What one response gave, frame by frame.
-struct Felt {
+struct ResponseTrace {
     depth_mm: Vec<f64>,
     normals: Vec<Vec3>,
     forces: Vec<Vec3>,
 }
 
-fn felt(scene: &Scene, method: Method, response: Option<Response>, tools: &[ToolState]) -> Felt {
+fn felt(scene: &Scene, method: Method, response: Option<Response>, tools: &[ToolState]) -> ResponseTrace {
     let (positions, still) = (&scene.mesh.positions, vec![Vec3::ZERO; scene.mesh.positions.len()]);
     let mut collision = collision(scene, method, response, None);
     let (mut model, mut out) = (Viscoelastic::BRAIN, TissueStep::default());
-    let mut felt = Felt { depth_mm: Vec::new(), normals: Vec::new(), forces: Vec::new() };
+    let mut felt = ResponseTrace { depth_mm: Vec::new(), normals: Vec::new(), forces: Vec::new() };
     for tool in tools {
         collision.step(positions, &still, tool, &mut out);
         felt.depth_mm.push(out.manifold.depth_mm.into());
@@ -237,7 +237,7 @@ fn felt(scene: &Scene, method: Method, response: Option<Response>, tools: &[Tool
 }
 
 /// The three methods along a path.
-fn all_felt(scene: &Scene, tools: &[ToolState]) -> [Felt; 3] {
+fn all_felt(scene: &Scene, tools: &[ToolState]) -> [ResponseTrace; 3] {
     let thesis = Method::of(&thesis::METHOD);
     let all = [(thesis, None), (thesis, Some(Response::NearestFace)), (Method::RECOMMENDED, None)];
     all.map(|(method, response)| felt(scene, method, response, tools))
@@ -253,7 +253,7 @@ fn forces(scope: Scope, findings: &mut Findings) {
         let comparison = Comparison::new("Table 4.3", format!("{name}, {file}: frames"), "");
         findings.rows.push(comparison.printed(Rule::Equal(0.0), 3000.0).ours(tools.len() as f64).row());
         let shown = &tools[..scope.pick(tools.len() / 3, tools.len())];
-        let of_models: Vec<[Felt; 3]> = models.iter().map(|(_, scene)| all_felt(scene, shown)).collect();
+        let of_models: Vec<[ResponseTrace; 3]> = models.iter().map(|(_, scene)| all_felt(scene, shown)).collect();
         parameters(&item, &name, &of_models[1], findings);
         depths(&name, &models, &of_models, findings);
         variation(&name, &of_models[1], findings);
@@ -263,7 +263,7 @@ fn forces(scope: Scope, findings: &mut Findings) {
     }
 }
 
-fn parameters(item: &str, path: &str, felt: &[Felt; 3], findings: &mut Findings) {
+fn parameters(item: &str, path: &str, felt: &[ResponseTrace; 3], findings: &mut Findings) {
     for method in [0, 2] {
         let title = format!("{item}: normal, Brain3, {path}, {}", NAMES[method]);
         let axes = [0, 1, 2].map(|n| axis(&felt[method].normals, n));
@@ -277,7 +277,7 @@ fn parameters(item: &str, path: &str, felt: &[Felt; 3], findings: &mut Findings)
     findings.rows.push(comparison.measured(turns).why(LATTICE).row());
 }
 
-fn depths(path: &str, models: &[(&str, Scene)], felt: &[[Felt; 3]], findings: &mut Findings) {
+fn depths(path: &str, models: &[(&str, Scene)], felt: &[[ResponseTrace; 3]], findings: &mut Findings) {
     for method in [0, 2] {
         let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
         let title = format!("Figure 4.18: depth, {path}, {}", NAMES[method]);
@@ -292,7 +292,7 @@ fn depths(path: &str, models: &[(&str, Scene)], felt: &[[Felt; 3]], findings: &m
     }
 }
 
-fn variation(path: &str, felt: &[Felt; 3], findings: &mut Findings) {
+fn variation(path: &str, felt: &[ResponseTrace; 3], findings: &mut Findings) {
     let stiffness = f64::from(Viscoelastic::BRAIN.stiffness);
     let varied =
         felt.each_ref().map(|felt| changes(&felt.depth_mm.iter().map(|depth| stiffness * depth).collect::<Vec<f64>>()));
@@ -302,7 +302,7 @@ fn variation(path: &str, felt: &[Felt; 3], findings: &mut Findings) {
     findings.rows.push(comparison.printed(Rule::Less, CHANGE_N).measured(varied.map(|values| most(&values))).row());
 }
 
-fn viscoelastic(felt: &[Felt; 3], findings: &mut Findings) {
+fn viscoelastic(felt: &[ResponseTrace; 3], findings: &mut Findings) {
     let lengths = felt.each_ref().map(|felt| felt.forces.iter().map(|f| f64::from(f.length())).collect::<Vec<f64>>());
     for method in [0, 2] {
         let axes = [0, 1, 2].map(|n| axis(&felt[method].forces, n));
@@ -316,7 +316,8 @@ fn viscoelastic(felt: &[Felt; 3], findings: &mut Findings) {
     let worst = lengths.map(|values| most(&values));
     let comparison = Comparison::new("Figure 4.20", "largest viscoelastic force", "N").printed(Rule::Less, DEVICE_N);
     findings.rows.push(comparison.measured(worst).why("printed: the device's limit is never reached").row());
-    let by_axis = |felt: &Felt| (0..3).map(|n| most(&changes(&axis(&felt.forces, n)))).fold(f64::NAN, f64::max);
+    let by_axis =
+        |felt: &ResponseTrace| (0..3).map(|n| most(&changes(&axis(&felt.forces, n)))).fold(f64::NAN, f64::max);
     let quantity = "largest change of the viscoelastic force on an axis in a frame";
     let comparison = Comparison::new("Figure 4.21", quantity, "N").measured(felt.each_ref().map(by_axis));
     findings.rows.push(comparison.row());

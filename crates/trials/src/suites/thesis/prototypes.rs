@@ -10,7 +10,7 @@ use super::deformable::DEVICE_N;
 use super::rigid::{axis, changes, lines, most};
 use crate::suites::deformable::recording::TETS;
 use crate::suites::render::scenes;
-use crate::suites::scripted::{Prepared, Ride, Shown};
+use crate::suites::scripted::{LookInput, Prepared, Ride};
 use crate::suites::{Part, Scope};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -92,7 +92,7 @@ fn coupled(ride: &Ride, findings: &mut Findings) {
 
 impl Album {
     /// Draws when drilling has begun, when the probe comes, and where it presses deepest.
-    fn watch(&mut self, shown: &Shown<'_>) {
+    fn watch(&mut self, shown: &LookInput<'_>) {
         if shown.sample.drilling {
             self.drilled += 1;
             match self.drilled {
@@ -124,13 +124,13 @@ impl Album {
         self.taken.iter().any(|snapshot| snapshot.title.starts_with(figure))
     }
 
-    fn take(&mut self, shown: &Shown<'_>, look: Look, title: &str) {
+    fn take(&mut self, shown: &LookInput<'_>, look: Look, title: &str) {
         let image = self.draw(shown, look);
         let png = STANDARD.encode(image.png().expect("a picture in memory can be packed"));
         self.taken.push(Snapshot { title: title.into(), png });
     }
 
-    fn draw(&mut self, shown: &Shown<'_>, look: Look) -> Image {
+    fn draw(&mut self, shown: &LookInput<'_>, look: Look) -> Image {
         let scene = shown.session.scene();
         let brain = scene.brain.as_ref();
         let data = SceneData {

@@ -1,6 +1,6 @@
 //! Fault cases of the libdrd driver.
 
-use super::{Bench, Case, Felt, Loop, Then, refused, row, run};
+use super::{Bench, Case, Loop, MotorForce, Then, refused, row, run};
 use trepan_emulators::{Library, drd};
 use trepan_evidence::suite::Row;
 use trepan_haptics::force_dimension::{Config, ForceDimension};
@@ -39,7 +39,7 @@ impl Omega {
 }
 
 impl Bench for Omega {
-    fn tick(&mut self) -> Felt {
+    fn tick(&mut self) -> MotorForce {
         self.tick += 1;
         if self.hasty {
             self.library.set(drd::TOO_SOON, f64::from(self.tick % 2));
@@ -53,7 +53,7 @@ impl Bench for Omega {
             _ => self.hand.tick(self.tick.into()),
         }
         let force = [drd::FORCE_X, drd::FORCE_Y, drd::FORCE_Z].map(|key| self.library.get(key));
-        Felt { at_ms: self.tick.into(), force_n: force.iter().map(|n| n * n).sum::<f64>().sqrt() }
+        MotorForce { at_ms: self.tick.into(), force_n: force.iter().map(|n| n * n).sum::<f64>().sqrt() }
     }
 
     fn fault(&self) -> Option<Fault> {

@@ -1,6 +1,6 @@
 //! Fault cases of the driver of Haply's service, in real time.
 
-use super::{Bench, Case, Course, Felt, Loop, Scope, Then, refused, row, run};
+use super::{Bench, Case, Course, Loop, MotorForce, Scope, Then, refused, row, run};
 use std::thread;
 use std::time::{Duration, Instant};
 use trepan_emulators::service::{Behaviour, Service};
@@ -81,7 +81,7 @@ impl Inverse {
 }
 
 impl Bench for Inverse {
-    fn tick(&mut self) -> Felt {
+    fn tick(&mut self) -> MotorForce {
         let messages = self.service.told().messages;
         if !self.silent {
             let now_ms = self.now_ms();
@@ -95,7 +95,7 @@ impl Bench for Inverse {
             (Some(began), Some(after)) if force_n == 0.0 => ((began - self.start) + after).as_secs_f64() * 1e3,
             _ => self.now_ms(),
         };
-        Felt { at_ms, force_n }
+        MotorForce { at_ms, force_n }
     }
 
     fn fault(&self) -> Option<Fault> {
@@ -123,8 +123,8 @@ fn cases() -> Vec<Case<Inverse>> {
         ("not calibrated", |b| b.behave(|s| s.status = UNCALIBRATED.into()), Fault::NotCalibrated),
         ("no power", |b| b.behave(|s| s.status = UNPOWERED.into()), Fault::NoPower),
         ("not ready", |b| b.behave(|s| s.status = UNREADY.into()), Fault::Braked),
-        ("garbage JSON", |b| b.behave(|s| s.garbage = Some("{\"inverse3\": [".into())), Fault::Garbled),
-        ("replies of an older version", |b| b.behave(|s| s.garbage = Some(OLD.into())), Fault::Garbled),
+        ("garbage JSON", |b| b.behave(|s| s.garbage = Some("{\"inverse3\": [".into())), Fault::InvalidMessage),
+        ("replies of an older version", |b| b.behave(|s| s.garbage = Some(OLD.into())), Fault::InvalidMessage),
         ("replies 50 ms late", |b| b.behave(|s| s.late_ms = 50), Fault::ServiceSilent),
         ("replies 10 ms late", |b| b.behave(|s| s.late_ms = 10), Fault::ServiceSilent),
         ("no replies", |b| b.behave(|s| s.mute = true), Fault::ServiceSilent),

@@ -40,7 +40,7 @@ enum Then {
 
 /// Motor force at a time.
 #[derive(Clone, Copy)]
-struct Felt {
+struct MotorForce {
     /// Time, ms.
     at_ms: f64,
     /// Force magnitude, N.
@@ -50,7 +50,7 @@ struct Felt {
 /// Driver on its emulator.
 trait Bench {
     /// Runs one tick of the loop.
-    fn tick(&mut self) -> Felt;
+    fn tick(&mut self) -> MotorForce;
     /// Fault reported by the driver.
     fn fault(&self) -> Option<Fault>;
 }
@@ -233,10 +233,10 @@ mod tests {
     }
 
     impl Bench for Slow {
-        fn tick(&mut self) -> Felt {
+        fn tick(&mut self) -> MotorForce {
             self.ticks += 1;
             self.left = self.left.map(|left| left.saturating_sub(1));
-            Felt { at_ms: self.ticks.into(), force_n: if self.left == Some(0) { 0.0 } else { 1.0 } }
+            MotorForce { at_ms: self.ticks.into(), force_n: if self.left == Some(0) { 0.0 } else { 1.0 } }
         }
         fn fault(&self) -> Option<Fault> {
             (self.left == Some(0)).then_some(Fault::NoPower)

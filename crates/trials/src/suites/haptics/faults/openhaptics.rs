@@ -1,6 +1,6 @@
 //! Fault cases of the libHD driver.
 
-use super::{Bench, Case, Felt, Loop, Then, refused, row, run};
+use super::{Bench, Case, Loop, MotorForce, Then, refused, row, run};
 use trepan_emulators::{Library, hd};
 use trepan_evidence::suite::Row;
 use trepan_haptics::openhaptics::{Config, OpenHaptics};
@@ -50,7 +50,7 @@ impl Touch {
 }
 
 impl Bench for Touch {
-    fn tick(&mut self) -> Felt {
+    fn tick(&mut self) -> MotorForce {
         self.tick += 1;
         if !self.silent {
             self.hand.tick(self.tick.into());
@@ -62,7 +62,7 @@ impl Bench for Touch {
             self.library.set(hd::TICKS, 1.0);
         }
         let force = [hd::FORCE_X, hd::FORCE_Y, hd::FORCE_Z].map(|key| self.library.get(key));
-        Felt { at_ms: (self.tick - self.paused).into(), force_n: force.iter().map(|n| n * n).sum::<f64>().sqrt() }
+        MotorForce { at_ms: (self.tick - self.paused).into(), force_n: force.iter().map(|n| n * n).sum::<f64>().sqrt() }
     }
 
     fn fault(&self) -> Option<Fault> {
