@@ -44,13 +44,13 @@ where the packages `mujoco-warp` and `warp-lang` are installed; `measure` has th
 
 /// Builds, copies and measures the folder.
 pub fn gpu(root: &Path, out: &Path) -> Result<()> {
-    make(root, out, ("release", &["--release"]))
+    make(root, out, ("release", &["--release", "--package", "trepan-trials", "--bin", "measure"]))
 }
 
 /// With the build folder and the flags of a profile.
 fn make(root: &Path, out: &Path, (profile, flags): (&str, &[&str])) -> Result<()> {
     ensure!(!out.exists(), "{}: is there already; name a new folder", out.display());
-    super::cargo(&[&["build", "--package", "trepan-trials", "--bin", "measure"], flags].concat(), &[])?;
+    super::cargo(&[&["build"], flags].concat(), &[])?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), Into::into);
     let (bin, lib) = (out.join("bin"), out.join("lib"));
     [&bin, &lib].into_iter().try_for_each(fs::create_dir_all)?;
@@ -78,7 +78,7 @@ fn make(root: &Path, out: &Path, (profile, flags): (&str, &[&str])) -> Result<()
 /// In the profile of the tests, which is built already.
 pub fn check(root: &Path) -> Result<()> {
     let place = std::env::temp_dir().join(format!("trepan-bundle-{}", std::process::id()));
-    let made = make(root, &place.join("bundle"), ("debug", &[])).and_then(|()| {
+    let made = make(root, &place.join("bundle"), ("debug", &crate::BINS)).and_then(|()| {
         let mut measure = Command::new(place.join("bundle/measure"));
         measure.args(["--software", "--quick", "agreement"]).current_dir(&place);
         measure.env_clear().envs([("HOME", &place), ("PATH", &"/usr/bin:/bin".into())]);

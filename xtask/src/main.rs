@@ -20,6 +20,9 @@ use std::process::{Command, ExitCode};
 /// What is off by default and still checked: the solver on the graphics device.
 const FEATURES: [&str; 2] = ["--features", "trepan-tled/gpu"];
 
+/// The programs as the tests have built them: other flags would build crates again.
+const BINS: [&str; 4] = ["--workspace", "--bins", FEATURES[0], FEATURES[1]];
+
 #[derive(Parser)]
 #[command(about = "Trepan's project commands", max_term_width = 120)]
 struct Arguments {
@@ -149,6 +152,7 @@ fn validate(arguments: &[String]) -> Result<()> {
 /// The steps of CI in the order in which they fail fastest.
 fn ci() -> Result<()> {
     test()?;
+    cargo(&[&["build"][..], &BINS].concat(), &[])?;
     operation::check(&root())?;
     validation::check(&root())?;
     bundle::check(&root())?;
@@ -224,6 +228,18 @@ fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {
         .with_context(|| format!("cannot start cargo {}", arguments[0]))?;
     if !status.success() {
         bail!("cargo {} failed", arguments[0]);
+    }
+    Ok(())
+}
+
+/// Runs a program that the tests have built.
+fn built(name: &str, arguments: &[&str]) -> Result<()> {
+    println!("xtask: {name} {}", arguments.join(" "));
+    let program = std::env::current_exe()?.with_file_name(name);
+    let status = Command::new(&program).args(arguments).current_dir(root()).status();
+    let status = status.with_context(|| format!("cannot start {}", program.display()))?;
+    if !status.success() {
+        bail!("{name} failed");
     }
     Ok(())
 }

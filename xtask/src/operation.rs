@@ -41,7 +41,7 @@ pub fn check(root: &Path) -> Result<()> {
     // With all its fluid the brain comes back to where it was, but for pulse and breath.
     let arguments =
         ["--headless", "--quality", "usual", "--duration", "8", "--csf-loss", "0", "--overwrite", "--out", &out_text];
-    crate::cargo(&["run", "--bin", "integrated", "--"], &arguments.map(String::from))?;
+    crate::built("integrated", &arguments)?;
     let text = std::fs::read_to_string(out.join("summary.json")).context("the operation left no summary.json")?;
     let summary: Value = serde_json::from_str(&text).context("summary.json is not JSON")?;
     for field in FIELDS {
