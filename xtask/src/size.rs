@@ -77,13 +77,13 @@ fn lines(folder: &Path) -> Result<[usize; 2]> {
     Ok(sum)
 }
 
-/// Whether the module that holds a file declares it for tests only.
+/// Whether a file's module, or one that holds it, is declared for tests only.
 fn is_test(file: &Path) -> Result<bool> {
-    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let folder = file.parent().unwrap_or(Path::new("."));
-    for parent in [folder.join("mod.rs"), folder.join("lib.rs"), folder.with_extension("rs")] {
-        if parent != file && parent.is_file() {
-            let text = fs::read_to_string(&parent)?;
+    for at in file.ancestors().take_while(|at| at.file_name().is_some_and(|name| name != "src")) {
+        let name = at.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let folder = at.parent().unwrap_or(Path::new("."));
+        for parent in [folder.join("mod.rs"), folder.join("lib.rs"), folder.with_extension("rs")] {
+            let text = if parent != file && parent.is_file() { fs::read_to_string(&parent)? } else { String::new() };
             if modules::of_tests(&text).any(|module| module == name) {
                 return Ok(true);
             }
@@ -112,7 +112,8 @@ mod tests {
         fs::create_dir_all(root.join("crates/haptics")).unwrap();
         let source = "fn one() {}\n// two\n#[cfg(test)]\nmod tests;\n";
         write("crates/a/src/lib.rs", source);
-        write("crates/a/src/tests.rs", "1\n2\n3\n");
+        write("crates/a/src/tests/mod.rs", "1\n2\n");
+        write("crates/a/src/tests/more.rs", "3\n");
         write("crates/b/src/lib.rs", "fn one() {}\n\n#[cfg(test)]\nmod tests {\n    fn x() {}\n}\n");
         write("crates/b/examples/e.rs", "1\n2\n");
         assert_eq!(lines(&root.join("crates/a")).unwrap(), [2, 5]);

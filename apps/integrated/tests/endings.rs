@@ -154,8 +154,9 @@ fn a_watcher_follows_and_killing_one_has_no_effect() {
     assert!(summary["remarks"].to_string().contains(&format!("session {name} has ended")), "{}", summary["remarks"]);
     let [was, seen] = [was, seen].map(|recording| recording.header);
     assert_eq!(was.hashes, seen.hashes, "the watcher runs the trainee's case");
-    for key in ["tets", "spacing_mm", "flap_mm", "friction", "solver_run", "method"] {
-        assert_eq!(was.config.get(key), seen.config.get(key), "{key} is the trainee's");
+    let sizes = ["sizes.tets", "sizes.spacing_mm", "operation.flap_mm"];
+    for key in sizes.into_iter().chain(["ingredients.friction", "ingredients.rigid", "solver_run"]) {
+        assert_eq!(was.config[key], seen.config[key], "{key} is the trainee's");
     }
 }
 

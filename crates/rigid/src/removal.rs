@@ -199,7 +199,7 @@ impl RemovalLaw {
         max_load_n: drilling::BURR_GREATEST_LOAD.f32(),
     };
 
-    /// The law of versions before 0.3, which recordings of them ran with.
+    /// The law that tests and trials compare with.
     ///
     /// Constant specific energy, and the hand's newtons as those of the task. Its constants are
     /// numerical parameters.

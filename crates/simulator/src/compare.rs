@@ -17,6 +17,7 @@ use crate::report::page::{Event, render};
 use crate::stages::score::ScoreKeeper;
 use crate::whole::whole;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use trepan_link::Recording;
@@ -60,8 +61,15 @@ fn remarks(sessions: &[Recording; 2]) -> Vec<String> {
         None => Some("Whether both are of one patient is unknown: an older version recorded at least one of them."),
     };
     remarks.extend(patients.map(String::from));
-    for (key, value) in &first.config {
-        let other = second.config.get(key).map_or("nothing", String::as_str);
+    let configs = [first, second].map(SessionConfig::of);
+    for (name, config) in NAMES.into_iter().zip(&configs) {
+        let fault = config.as_ref().err();
+        remarks.extend(fault.map(|fault| format!("The {name} recording: {fault}. Its newtons are the hand's.")));
+    }
+    let [of_first, of_second] = configs.map(|config| config.unwrap_or_default().entries());
+    let keys: BTreeSet<&String> = of_first.keys().chain(of_second.keys()).collect();
+    for key in keys {
+        let [value, other] = [&of_first, &of_second].map(|of| of.get(key).map_or("nothing", String::as_str));
         if other != value {
             remarks.push(format!("{key} was {value} in the first session, {other} in the second."));
         }
@@ -140,7 +148,7 @@ mod tests {
             ..TickRecord::default()
         };
         let event = |kind: &str, text: &str| EventRecord { kind: kind.into(), text: text.into(), ..Default::default() };
-        let config = [("spacing_mm".to_string(), spacing.to_string())].into();
+        let config = [("sizes.spacing_mm".to_string(), spacing.to_string())].into();
         Recording {
             header: SessionHeader { app: "integrated".into(), config, ..Default::default() },
             ticks: (0..2000).map(tick).collect(),
@@ -164,7 +172,7 @@ mod tests {
     #[test]
     fn the_page_lists_differences_and_shows_both() {
         let page = page(&[session(1.0, "1"), session(2.5, "0.5")]).unwrap();
-        assert!(page.contains("spacing_mm was 1 in the first session, 0.5 in the second"));
+        assert!(page.contains("sizes.spacing_mm was 1 in the first session, 0.5 in the second"));
         assert!(page.contains("<td class=\"n\">1.000</td><td class=\"n\">2.500</td><td class=\"n\">1.500</td>"));
         assert!(page.contains("burr &lt;near&gt;") && !page.contains("{}") && page.matches("<svg").count() == 12);
         assert!(!page.contains("src=") && !page.contains("href="), "it needs nothing else");

@@ -1,7 +1,7 @@
 //! Settings of an operation: flap, loss of cerebrospinal fluid, forbidden tissue, brain stiffness,
 //! tick rate. They come from the options, else from the replayed recording, else from defaults.
 
-use crate::options::{CSF_SPEED_UPS, MODULI_KPA, Options, RATES_HZ};
+use crate::options::Options;
 use crate::tissue_class::TissueClass;
 use serde::{Deserialize, Serialize};
 use trepan_haptics::DeviceName;
@@ -75,19 +75,6 @@ impl Operation {
             rate_hz: options.rate_hz.unwrap_or(base.rate_hz),
             opening_needed: base.opening_needed && !watches,
             force_waits: base.force_waits && !watches,
-        }
-    }
-
-    /// Refuses a recorded number that no flag allows.
-    pub fn check(&self) -> Result<(), String> {
-        let ranges = [
-            ("csf_speed_up", self.csf_speed_up, CSF_SPEED_UPS),
-            ("young_modulus_kpa", self.young_modulus_kpa, MODULI_KPA),
-            ("rate_hz", self.rate_hz, RATES_HZ),
-        ];
-        match ranges.into_iter().find(|(_, value, [low, high])| !(*low..=*high).contains(&f64::from(*value))) {
-            None => Ok(()),
-            Some((name, value, [low, high])) => Err(format!("operation.{name} is {value}, out of {low} to {high}")),
         }
     }
 }

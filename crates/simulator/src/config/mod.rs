@@ -10,11 +10,13 @@ mod old_header;
 
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
+use crate::force_scale::ForceScale;
 use crate::ingredients::Ingredients;
 use crate::measure::Parts;
 use crate::operation::Operation;
+use crate::options::{CSF_SPEED_UPS, MODULI_KPA, RATES_HZ};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
@@ -65,6 +67,30 @@ impl SessionConfig {
         out
     }
 
+    /// Refuses a recorded number that no flag allows.
+    fn check(&self) -> Result<(), String> {
+        let Sizes { spacing_mm, halvings, .. } = self.sizes;
+        let second = self.second_device.clone().unwrap_or_default();
+        let of_flags = |mm: f64| mm as f32;
+        let ranges = [
+            ("operation.flap_mm", self.operation.flap_mm, [0.0, 90.0]),
+            ("operation.csf_loss", self.operation.csf_loss.unwrap_or(0.0), [0.0, 1.0]),
+            ("operation.csf_speed_up", self.operation.csf_speed_up, CSF_SPEED_UPS.map(of_flags)),
+            ("operation.young_modulus_kpa", self.operation.young_modulus_kpa, MODULI_KPA.map(of_flags)),
+            ("operation.rate_hz", self.operation.rate_hz, RATES_HZ.map(of_flags)),
+            ("sizes.spacing_mm", spacing_mm.map_or(1.0, of_flags), [0.2, 4.0]),
+            ("sizes.halvings", halvings.unwrap_or(0) as f32, [0.0, 4.0]),
+            ("device.scale", self.device.scale, [0.2, 5.0]),
+            ("device.force_scale", self.device.force_scale, ForceScale::RANGE.map(of_flags)),
+            ("second_device.scale", second.scale, [0.2, 5.0]),
+            ("second_device.force_scale", second.force_scale, ForceScale::RANGE.map(of_flags)),
+        ];
+        match ranges.into_iter().find(|(_, value, [low, high])| !(low..=high).contains(&value)) {
+            None => Ok(()),
+            Some((path, value, [low, high])) => Err(format!("{path} is {value}, out of {low} to {high}")),
+        }
+    }
+
     /// Reads a recording's header.
     ///
     /// # Errors
@@ -80,9 +106,10 @@ impl SessionConfig {
             let alone = entries.iter().find(|entry| filled(&mut [*entry].into_iter()).is_err());
             format!("{}: {fault}", alone.map_or("", |(path, _)| path))
         });
-        let read = read.and_then(|config| config.operation.check().map(|()| config));
+        let read = read.and_then(|config| config.check().map(|()| config));
         read.map_err(|fault| {
-            SessionError::Usage(format!("the recording's header cannot be read: {fault}; its session cannot run again"))
+            let remedy = "run the version that made it, or record again";
+            SessionError::Usage(format!("the session's header cannot be read: {fault}; {remedy}"))
         })
     }
 }
@@ -113,18 +140,24 @@ fn decimal(number: &serde_json::Number) -> String {
     short.unwrap_or_else(|| number.to_string())
 }
 
-/// Sets the leaf at a path: text where the default is text, else what it says as JSON.
+/// Sets the leaf at a path: text where the default is text, else what it says as JSON. A path that
+/// the default lacks is left alone, so the depth is bounded.
 fn fill(value: &mut Value, path: &str, text: &str) {
-    if value.is_null() {
-        *value = Value::Object(Map::new());
-    }
     let Value::Object(fields) = value else { return };
-    if let Some((name, rest)) = path.split_once('.') {
-        return fill(fields.entry(name).or_insert(Value::Null), rest, text);
+    let (name, rest) = path.split_once('.').map_or((path, None), |(name, rest)| (name, Some(rest)));
+    match (fields.get_mut(name), rest) {
+        (None, _) => {}
+        (Some(below), Some(rest)) => {
+            if below.is_null() && name == "second_device" {
+                *below = serde_json::to_value(DeviceLimits::default()).unwrap_or_default();
+            }
+            fill(below, rest, text);
+        }
+        (Some(leaf), None) => {
+            let read = if leaf.is_string() { None } else { serde_json::from_str(text).ok() };
+            *leaf = read.unwrap_or_else(|| Value::String(text.into()));
+        }
     }
-    let is_text = matches!(fields.get(path), Some(Value::String(_)));
-    let read = if is_text { None } else { serde_json::from_str(text).ok() };
-    fields.insert(path.into(), read.unwrap_or_else(|| Value::String(text.into())));
 }
 
 #[cfg(test)]
@@ -183,9 +216,19 @@ mod tests {
         assert_eq!((of("ingredients.friction"), of("why.bone")), ("0.1", "12"));
         assert_eq!(of("operation.forbidden"), "[\"tumour\",\"vessel\"]");
         assert_eq!(read(BTreeMap::new()).unwrap(), SessionConfig::default());
-        let unknown = BTreeMap::from([("operation.blood_ml".into(), "3".into()), ("rooms".into(), "x".into())]);
+        let deep = "a.".repeat(200_000);
+        let unknown = [("operation.blood_ml", "3"), ("rooms", "x"), ("ingredients.viscosity", "3"), (&deep, "3")];
+        let unknown = unknown.map(|(path, text)| (path.to_string(), text.to_string())).into();
         assert_eq!(read(unknown).unwrap(), SessionConfig::default());
-        for (path, text) in [("operation.rate_hz", "0"), ("operation.flap_mm", "wide"), ("sizes.tets", "-1")] {
+        let bad = [
+            ("operation.rate_hz", "0"),
+            ("operation.flap_mm", "wide"),
+            ("operation.flap_mm", "91"),
+            ("sizes.tets", "-1"),
+            ("device.force_scale", "0"),
+            ("second_device.scale", "9"),
+        ];
+        for (path, text) in bad {
             let fault = read(BTreeMap::from([(path.into(), text.into())])).unwrap_err().to_string();
             assert!(fault.contains("header cannot be read") && fault.contains(text) && fault.contains(path), "{fault}");
         }

@@ -153,8 +153,11 @@ impl Rows {
         if let Some(every_ms) = self.every_ms {
             self.next_ms = ((tick.time_ms / every_ms).floor() + 1.0) * every_ms;
         }
-        let scale =
-            *self.scale.get_or_insert_with(|| SessionConfig::of(header).unwrap_or_default().device.force_scale());
+        let scale = match self.scale {
+            Some(scale) => scale,
+            None => SessionConfig::of(header).map_err(std::io::Error::other)?.device.force_scale(),
+        };
+        self.scale = Some(scale);
         let (removed_mm3, removed_in_all_mm3) = (std::mem::take(&mut self.removed_mm3), self.removed_in_all_mm3);
         let sampled =
             Sampled { tick, scale, removed_mm3, removed_in_all_mm3, through: std::mem::take(&mut self.through) };
