@@ -134,7 +134,7 @@ fn flatten(value: &Value, path: String, out: &mut BTreeMap<String, String>) {
 }
 
 /// The shortest decimal of a number: 0.1 also where it came from an `f32`.
-fn decimal(number: &serde_json::Number) -> String {
+fn decimal(number: &Number) -> String {
     let short = number.as_f64().filter(|_| number.is_f64()).map(|wide| (wide, wide as f32));
     let short = short.filter(|(wide, short)| f64::from(*short) == *wide).map(|(_, short)| short.to_string());
     short.unwrap_or_else(|| number.to_string())
