@@ -4,7 +4,7 @@ use glam::Vec2;
 use trepan_geometry::Vec3;
 use trepan_mesh::Surface;
 use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
-use trepan_tled::{Config, Damping, Pass, Tled};
+use trepan_tled::{Config, Damping, Pass, Settled, Settling, Tled};
 
 const EDGES_MM: Vec3 = Vec3::new(12.0, 9.0, 8.0);
 const SHEAR_N_PER_MM: f32 = 0.12;
@@ -95,5 +95,19 @@ fn steps_as_long_as_without_it_give_a_shaken_body_no_energy() {
     for selective_mass_scaling in [false, true] {
         let [whole, half] = [1, 2].map(|halves| motion(selective_mass_scaling, halves));
         assert!(whole < 1.3 * half, "{selective_mass_scaling}: {whole} of {half} mm²/ms²");
+    }
+}
+
+/// A hammock: the tension that a load has made is what bears more of it.
+#[test]
+fn a_stretched_membrane_settles_in_few_steps() {
+    let mut body = block(SHEAR_N_PER_MM, false);
+    body.fixed = boxes::nodes_where(&body.mesh, |p| p.x < 1e-3 || p.x > EDGES_MM.x - 1e-3);
+    let settling = Settling { tolerance_mm: 1e-3, steps: 300 };
+    for times in [3.0, 12.0, 25.0, 50.0] {
+        let mut tled = Tled::new(&body, &Config::default()).expect("the block is sound");
+        let loads = Loads { gravity: Vec3::NEG_Z * (9.81e-3 * times), ..Loads::default() };
+        let settled @ Settled { steps, converged, .. } = tled.settle(&loads, &settling);
+        assert!(converged && steps < 40, "{times} weights: {settled:?}");
     }
 }
