@@ -15,7 +15,7 @@ const THREAD_GAIN: f64 = 0.8;
 const LONGEST_DT_MS: f64 = 1.0;
 /// Step of the implicit solver, ms: four haptic ticks at 1 kHz.
 pub(crate) const IMPLICIT_DT_MS: f64 = 4.0;
-/// Time of a haptic tick without bone, µs. The spin before its deadline takes some 70, collision
+/// Time of a haptic tick without bone, µs. The spin before its deadline takes 10 to 70, collision
 /// with tissue 45, device, force model, guard and recording the rest.
 const FIXED_US_PER_TICK: f64 = 125.0;
 

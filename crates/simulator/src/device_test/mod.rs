@@ -14,7 +14,7 @@ mod trial;
 
 use crate::error::SessionError;
 use crate::report::summary::Machine;
-use crate::run::clock::{Clock, Schedule};
+use crate::run::clock::{Clock, Schedule, Waits};
 use crate::run::stop::Stop;
 use crate::run::threads::{HapticDeviceOwner, real_time};
 use crate::whole::whole;
@@ -134,11 +134,11 @@ fn run_loop(
 ) -> TestRun {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut samples = Vec::with_capacity((1.1 * end_ms / tick_ms) as usize + FADE_TICKS as usize);
-    let (mut late, mut ending, mut fade) = (0, None, FADE_TICKS);
+    let (mut waits, mut late, mut ending, mut fade) = (Waits::default(), 0, None, FADE_TICKS);
     let clock = Clock::start();
     let mut schedule = Schedule::new(tick_ms, clock.now_ms());
     loop {
-        clock.spin_until(schedule.next_ms());
+        waits.until(schedule.next_ms(), &clock);
         let time_ms = clock.now_ms();
         let reading = hand.device.read(time_ms);
         let read_ms = clock.now_ms();

@@ -13,7 +13,7 @@
 //! loop. Real-time priority is requested from the operating system; a refusal becomes a remark. The
 //! force is set to zero and the device closed in every case, also when a loop panics.
 
-use crate::run::clock::{Clock, Schedule};
+use crate::run::clock::{Clock, Schedule, Waits};
 use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
 use crate::run::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
@@ -44,9 +44,9 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut ticks = Ticks::default();
     let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
-    let (mut ending, mut second_pose) = (None, None);
+    let (mut waits, mut ending, mut second_pose) = (Waits::default(), None, None);
     loop {
-        clock.spin_until(schedule.next_ms());
+        waits.until(schedule.next_ms(), &clock);
         let now_ms = clock.now_ms();
         let reading = hands.owner.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
