@@ -56,8 +56,10 @@ impl TriangleShape {
         6.0 * self.area_mm2 * largest
     }
 
-    /// Stiffness between each two corners at their present places, N/mm, for a membrane of 1 N/mm:
-    /// `add` takes both and the block, the change of the force with the place. None where it is slack.
+    /// Stiffness between each two corners at their present places, N/mm, for a membrane of 1 N/mm.
+    ///
+    /// `add` takes both and the block, the change of the force with the place; it is not called
+    /// where the triangle is slack.
     pub(crate) fn stiffness(&self, now: [DVec3; 3], mut add: impl FnMut(usize, usize, DMat3)) {
         let along = |axis: fn(&DVec2) -> f64| (0..3).map(|a| now[a] * axis(&self.gradients[a])).sum::<DVec3>();
         let (f, g) = (along(|g| g.x), along(|g| g.y));
