@@ -59,7 +59,7 @@ fn make(root: &Path, out: &Path, (profile, flags): (&str, &[&str])) -> Result<()
     ensure!(strip.status().context("strip, of binutils")?.success(), "strip failed");
     copy(&root.join("fixtures/case-head"), &bin.join("fixtures/case-head"))?;
     copy(&root.join("crates/evidence/limits"), &bin.join("limits"))?;
-    fs::copy(root.join("crates/trials/src/suites/rivals/mujoco_warp.py"), out.join("mujoco_warp.py"))?;
+    fs::copy(root.join("crates/trials/tissue/src/rivals/mujoco_warp.py"), out.join("mujoco_warp.py"))?;
     fs::write(out.join("measure"), MEASURE)?;
     fs::set_permissions(out.join("measure"), fs::Permissions::from_mode(0o755))?;
     fs::write(out.join("README.md"), README)?;

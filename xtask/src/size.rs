@@ -19,20 +19,20 @@ pub fn check(root: &Path) -> Result<Vec<String>> {
     let budgets = budgets(&fs::read_to_string(root.join("crates/README.md")).context("crates/README.md")?);
     let mut faults = Vec::new();
     let mut sum = [0; 2];
-    println!("{:<14} {:>7} {:>7} {:>7}", "crate", "source", "budget", "tests");
+    println!("{:<17} {:>7} {:>7} {:>7}", "crate", "source", "budget", "tests");
     for (name, folder) in crates(root)? {
         let [source, tests] = lines(&folder)?;
         sum = [sum[0] + source, sum[1] + tests];
         let budget = budgets.get(&name).copied();
         let shown = budget.map_or_else(|| "-".into(), |budget| budget.to_string());
-        println!("{name:<14} {source:>7} {shown:>7} {tests:>7}");
+        println!("{name:<17} {source:>7} {shown:>7} {tests:>7}");
         match budget {
             Some(budget) if source <= budget => {}
             Some(budget) => faults.push(format!("{name} has {source} lines of source, its budget is {budget}")),
             None => faults.push(format!("{name} has no budget in crates/README.md")),
         }
     }
-    println!("{:<14} {:>7} {:>7} {:>7}", "all", sum[0], "", sum[1]);
+    println!("{:<17} {:>7} {:>7} {:>7}", "all", sum[0], "", sum[1]);
     Ok(faults)
 }
 
@@ -45,19 +45,29 @@ fn budgets(readme: &str) -> BTreeMap<String, usize> {
     readme.lines().filter_map(row).collect()
 }
 
-/// Every crate by name, with its folder.
+/// Every crate by name, with its folder; one within another by both names.
 fn crates(root: &Path) -> Result<BTreeMap<String, std::path::PathBuf>> {
     let mut found = BTreeMap::from([("xtask".to_string(), root.join("xtask"))]);
-    for home in ["crates", "apps", "crates/haptics"] {
-        for entry in fs::read_dir(root.join(home)).with_context(|| home.to_string())? {
-            let folder = entry?.path();
-            if folder.join("Cargo.toml").is_file() {
-                let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                found.insert(name, folder);
-            }
+    for home in ["crates", "apps"] {
+        for folder in with_manifest(&root.join(home))? {
+            let within = with_manifest(&folder)?;
+            let inner = within.into_iter().map(|inner| (format!("{}-{}", name(&folder), name(&inner)), inner));
+            found.extend(inner);
+            found.insert(name(&folder), folder);
         }
     }
     Ok(found)
+}
+
+/// The folders in a folder that hold a crate.
+fn with_manifest(home: &Path) -> Result<Vec<std::path::PathBuf>> {
+    let entries = fs::read_dir(home).with_context(|| home.display().to_string())?;
+    let folders: Vec<_> = entries.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
+    Ok(folders.into_iter().filter(|folder| folder.join("Cargo.toml").is_file()).collect())
+}
+
+fn name(folder: &Path) -> String {
+    folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Lines of source and of tests in a crate; a crate within it counts for itself.

@@ -6,7 +6,8 @@
 //! `cargo run -p trepan-trials --example record_paths [rigid|deformable] [FOLDER]`
 
 use std::path::PathBuf;
-use trepan_trials::suites::{deformable, rigid};
+use trepan_trials_bone::rigid;
+use trepan_trials_tissue::deformable;
 
 fn main() -> anyhow::Result<()> {
     let fixtures = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/paths");

@@ -18,9 +18,9 @@ use trepan_evidence::store::{self, Store};
 use trepan_evidence::suite::{Gate, shown};
 use trepan_evidence::timer::Control;
 use trepan_evidence::{borders, compare, limits, page, repeat};
-use trepan_trials::calibration;
 use trepan_trials::suites::families;
 use trepan_trials::suites::{ALL, ON_REQUEST};
+use trepan_trials_sessions::calibration;
 
 #[derive(Parser)]
 #[command(name = "cargo xtask validate", about = "Run validation suites", max_term_width = 120)]

@@ -1,33 +1,14 @@
 //! All validation suites, one file each; one list feeds the command line and the page.
 
-mod ablation;
-pub mod budget;
-mod card;
-mod claims;
-mod conditions;
-pub mod deformable;
 mod failures;
 pub mod families;
-mod force;
-mod haptics;
-mod measurement;
-mod mesh;
-mod operation;
-mod population;
-mod python;
-mod render;
-pub mod rigid;
-mod rivals;
-mod scripted;
-mod sensitivity;
-mod simulators;
 mod thesis;
-pub mod tled;
-mod volume;
-mod voxel_size;
 
 use trepan_evidence::part::nothing_more;
 pub use trepan_evidence::part::{Part, Scope, Suite};
+use trepan_trials_bone::{force, haptics, rigid, sensitivity, voxel_size};
+use trepan_trials_sessions::{ablation, budget, measurement, operation, population, scripted, simulators};
+use trepan_trials_tissue::{card, deformable, mesh, render, rivals, tled, volume};
 
 /// Suites that run only when named: they need a graphics card,
 /// download other programs, or take an hour.

@@ -1,0 +1,333 @@
+//! A tool pressed along its axis into a round block: by symmetry the force is axial, and an
+//! independent code knows its size.
+//!
+//! # Theory
+//! The block of brain is 30 mm in radius and depth, fixed below and free above and at the side. The
+//! truth is `fixtures/fem/axial.csv` by `axial.py`: quadrilaterals in axial symmetry, quadratic
+//! displacements and discontinuous linear pressure, Newton's method, f64, augmented Lagrange
+//! against the exact ball, with and without a membrane on the top; its two finest meshes agree
+//! within 0.5 percent. It has no friction. The
+//! tool goes on its way as a hand does, at 40 mm/s, and rests at each depth. A tool that came on an
+//! oblique way without friction is where an upright one would be at the same place.
+//!
+//! # Practice
+//! TLED steps as in a session: law, element, mass scaling and contact of `auto`, without
+//! relaxation, collision once in a millisecond. Beyond two radii a press without friction has no
+//! proven truth; there only direction, rest and inverted elements are judged. Other stiffnesses of
+//! the contact are charted, not judged.
+
+use super::Scope;
+use super::outside::{Shape, Size};
+use anyhow::{Context, Result};
+use trepan_contact::NodalContacts;
+use trepan_deformable::{TissueCollision, TissueStep};
+use trepan_evidence::part::Part;
+use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_geometry::{Pose, Quat, Tool, ToolState, Twist, Vec3, quantile};
+use trepan_mesh::{TetMesh, lattice};
+use trepan_simulator::Ingredients;
+use trepan_simulator::measure::tissue::MASS_ADDED;
+use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
+use trepan_tled::{Config, Damping, Tled};
+use trepan_volume::VoxelVolume;
+
+/// Radius and depth of the block, mm, and edge of its voxels, mm.
+const BLOCK_MM: f32 = 30.0;
+const VOXEL_MM: f32 = 1.0;
+/// Speed of the tool, mm/ms, its distance before the touch, mm, and rest at each depth, ms.
+const SPEED: f32 = 0.04;
+const BEFORE_MM: f32 = 0.5;
+const REST_MS: u32 = 200;
+/// End of that rest in which the force must stay what it is, ms.
+const STILL_MS: usize = 50;
+/// Force from which its direction counts, N.
+const FELT_N: f32 = 0.01;
+/// A session's share of added mass is one of the whole brain, and nearly all of it lies on the
+/// small elements at the opening. With so many times that share the block's top is as heavy: its
+/// stable step is that of a session's mesh of 12,000 tetrahedra, 0.24 ms.
+const BRAIN_OVER_BLOCK: f32 = 6.0;
+/// The middle of the block's top lies so far from the tool's way, mm: no node is special.
+const ASIDE: Vec3 = Vec3::new(0.31, 0.17, 0.0);
+
+/// Published shear stiffness of human pia-arachnoid, N/mm: modulus times thickness.
+fn pia_arachnoid_n_per_mm() -> f32 {
+    trepan_measurements::brain_membranes::PIA_SHEAR_STIFFNESS.f32()
+}
+
+/// What is pressed, and how.
+struct Scene {
+    name: &'static str,
+    tool: Tool,
+    friction: f32,
+    /// Angle between the way and the axis, degrees.
+    oblique_deg: f32,
+    /// It rests at every millimetre down to this depth.
+    deepest_mm: u32,
+    /// The deepest that the truth has, mm.
+    truth_mm: u32,
+    /// Stiffness of the contact, N/mm for each mm².
+    stiffness_per_mm2: f32,
+    /// Added mass over a session's share of it.
+    heavier: f32,
+    /// Shear stiffness of the membrane on the top, N/mm.
+    membrane_n_per_mm: f32,
+}
+
+impl Scene {
+    fn all() -> Vec<Self> {
+        let rod = |radius: f32| Tool { shaft_radius_mm: radius, ..Tool::probe(radius) };
+        let probe = Self {
+            name: "probe",
+            tool: Tool::probe(2.0),
+            friction: Ingredients::default().friction,
+            oblique_deg: 0.0,
+            deepest_mm: 8,
+            truth_mm: 4,
+            stiffness_per_mm2: USUAL,
+            heavier: 1.0,
+            membrane_n_per_mm: 0.0,
+        };
+        let as_in_session = Self { heavier: BRAIN_OVER_BLOCK, ..probe };
+        let pia = Self { membrane_n_per_mm: pia_arachnoid_n_per_mm(), ..as_in_session };
+        vec![
+            Self { name: "rod of 2 mm", tool: rod(2.0), ..probe },
+            Self { name: "rod of 5 mm", tool: rod(5.0), truth_mm: 8, ..probe },
+            Self { name: "spatula", tool: Tool::spatula(), truth_mm: 6, ..probe },
+            Self { name: "probe, 30 degrees", friction: 0.0, oblique_deg: 30.0, deepest_mm: 4, ..probe },
+            Self {
+                name: "spatula, 30 degrees",
+                tool: Tool::spatula(),
+                friction: 0.0,
+                oblique_deg: 30.0,
+                deepest_mm: 4,
+                ..probe
+            },
+            Self { name: "probe, as heavy as in a session", ..as_in_session },
+            Self { name: "spatula, as heavy as in a session", tool: Tool::spatula(), truth_mm: 6, ..as_in_session },
+            Self { name: "probe on pia-arachnoid", heavier: 1.0, ..pia },
+            Self { name: "probe on pia-arachnoid, as heavy as in a session", ..pia },
+            Self { name: "rod of 5 mm on pia-arachnoid, as heavy as in a session", tool: rod(5.0), truth_mm: 8, ..pia },
+            Self {
+                name: "spatula on pia-arachnoid, as heavy as in a session",
+                tool: Tool::spatula(),
+                truth_mm: 6,
+                ..pia
+            },
+            Self { name: "probe, soft contact", stiffness_per_mm2: 0.05, ..probe },
+            Self { name: "probe, stiff contact", stiffness_per_mm2: 0.2, ..probe },
+            probe,
+        ]
+    }
+
+    /// Direction of the way into the block.
+    fn way(&self) -> Vec3 {
+        Quat::from_rotation_y(self.oblique_deg.to_radians()) * Vec3::NEG_Z
+    }
+}
+
+/// Stiffness of the contact that is judged, N/mm for each mm².
+const USUAL: f32 = 0.1;
+
+/// Sizes of the block: tetrahedra, and halvings of their edges at the top's middle.
+fn sizes(scope: Scope) -> &'static [(usize, u32)] {
+    scope.pick(&[(12_000, 3)], &[(8_000, 3), (12_000, 3), (20_000, 3)])
+}
+
+/// The part of this suite.
+pub fn parts() -> Vec<Part> {
+    let of = |scene: Scene| {
+        Part::new(format!("axial press: {}", scene.name), move |scope, findings: &mut Findings| {
+            for &size in sizes(scope) {
+                judge(&scene, size, findings).expect("the fixture and the mesh are sound");
+            }
+        })
+    };
+    Scene::all().into_iter().map(of).collect()
+}
+
+/// The block's top at z = 0, its middle at the origin.
+fn block((target_tets, halvings): (usize, u32)) -> Result<TetMesh> {
+    let (across, high, margin) = (2 * (BLOCK_MM / VOXEL_MM) as usize, (BLOCK_MM / VOXEL_MM) as usize, 2);
+    let size = [across + 2 * margin, across + 2 * margin, high + 2 * margin];
+    let first = Vec3::new(-BLOCK_MM, -BLOCK_MM, -BLOCK_MM) + VOXEL_MM * (0.5 - margin as f32);
+    let mut mask = VoxelVolume::isotropic(size, first, VOXEL_MM, 0u16);
+    for at in 0..mask.data.len() {
+        let steps = [at % size[0], at / size[0] % size[1], at / (size[0] * size[1])];
+        let place = first + VOXEL_MM * Vec3::from_array(steps.map(|n| n as f32));
+        let inside = place.truncate().length() < BLOCK_MM && (margin..high + margin).contains(&steps[2]);
+        mask.data[at] = u16::from(inside);
+    }
+    let fine = lattice::Fine { centre: Vec3::Z, radius_mm: 7.0, halvings };
+    let config = lattice::Config::with_opening(target_tets, Some(fine));
+    Ok(lattice::Domain::of(&mask, &config)?.labelled(&config)?.mesh)
+}
+
+/// Mean edge of the surface within 3 mm of the top's middle, mm.
+fn edge_mm(mesh: &TetMesh) -> f64 {
+    let triangles = trepan_mesh::Surface::of(mesh).triangles.into_iter().map(|t| t.map(|n| mesh.positions[n as usize]));
+    let near = triangles.filter(|[a, b, c]| ((*a + *b + *c) / 3.0).length() < 3.0);
+    let edges: Vec<f64> =
+        near.flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)]).map(f64::from).collect();
+    edges.iter().sum::<f64>() / edges.len() as f64
+}
+
+/// What was found at one depth.
+#[derive(Default)]
+struct Found {
+    depth_mm: u32,
+    force_n: f64,
+    tilt_deg: f64,
+    tilt_moving_deg: f64,
+    wander_n: f64,
+    /// Depth, mm, and force, N, in the last step at full speed.
+    moving: (f64, f64),
+    inverted: u32,
+    skipped_ms: f64,
+}
+
+/// Damping of the built-in brain as a session damps it, 1/ms: critical for its lowest mode.
+/// Critical damping of the block's own would hold back a moving tool.
+fn damping_per_ms() -> Result<f32> {
+    let size = Size { count: 3_000, halvings: 0, of_truth: false };
+    let brain = Shape::brain()?.pressed(size, false)?.body;
+    let body = Body::uniform(brain.mesh, brain.fixed, Material::WHOLE_BRAIN);
+    Ok(Tled::new(&body, &Config::default())?.damping_per_ms())
+}
+
+fn press(scene: &Scene, mesh: &TetMesh) -> Result<(Vec<Found>, [f64; 2])> {
+    let fixed = boxes::nodes_where(mesh, |p| p.z < 0.5 * VOXEL_MM - BLOCK_MM);
+    let mut triangles = trepan_mesh::Surface::of(mesh).triangles;
+    triangles.retain(|t| t.iter().all(|&n| mesh.positions[n as usize].z > -0.01));
+    let membrane = Membrane { triangles, shear_n_per_mm: scene.membrane_n_per_mm };
+    let body = Body { membrane, ..Body::uniform(mesh.clone(), fixed, Material::WHOLE_BRAIN) };
+    let config = Config {
+        mass_scaling: MASS_ADDED * scene.heavier,
+        dynamic_mass_scaling: 16.0,
+        selective_mass_scaling: true,
+        averaged_pressure: true,
+        damping: Damping::Rate(damping_per_ms()?),
+        ..Config::default()
+    };
+    let mut solver = Tled::new(&body, &config)?;
+    let (friction, stiffness_per_mm2) = (scene.friction, scene.stiffness_per_mm2);
+    let touch = trepan_deformable::Config { friction, shaft: true, stiffness_per_mm2, ..Default::default() };
+    let mut collision = TissueCollision::new(mesh, &scene.tool, &touch)?;
+    let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
+    let (mut out, mut times_us, mut all) = (TissueStep::default(), Vec::new(), Vec::new());
+    let (mut way_mm, mut now_ms) = (-BEFORE_MM, 0.0f32);
+    for depth_mm in 1..=scene.deepest_mm {
+        let end_mm = depth_mm as f32 / scene.way().dot(Vec3::NEG_Z);
+        let mut found = Found { depth_mm, ..Found::default() };
+        let (mut rest_ms, mut forces) = (0, Vec::new());
+        while rest_ms < REST_MS {
+            let moves = way_mm < end_mm;
+            let at_speed = way_mm + SPEED <= end_mm;
+            way_mm = (way_mm + SPEED).min(end_mm);
+            rest_ms += u32::from(!moves);
+            let tip = ASIDE + Vec3::Z * scene.tool.tip_radius_mm + scene.way() * way_mm;
+            let twist = Twist { linear: if moves { scene.way() * SPEED } else { Vec3::ZERO }, angular: Vec3::ZERO };
+            let state = ToolState { twist, time_ms: now_ms.into(), ..ToolState::at(Pose::from_translation(tip)) };
+            let began = std::time::Instant::now();
+            collision.step(solver.positions(), solver.velocities(), &state, &mut out);
+            times_us.push(began.elapsed().as_secs_f64() * 1e6);
+            loads.contacts.clear();
+            out.springs(&mut loads.contacts);
+            let force = out.patch.normal * out.patch.force_n;
+            let tilt_deg = f64::from(force.angle_between(Vec3::Z).to_degrees());
+            if at_speed {
+                let under_mm = f64::from(way_mm * scene.way().dot(Vec3::NEG_Z));
+                found.moving = (under_mm, out.patch.force_n.into());
+            }
+            match moves {
+                true if out.patch.force_n > FELT_N => found.tilt_moving_deg = found.tilt_moving_deg.max(tilt_deg),
+                true => {}
+                false => forces.push((force, tilt_deg)),
+            }
+            let next_ms = now_ms + 1.0;
+            while now_ms < next_ms {
+                let dt_ms = solver.next_dt_ms().min(next_ms - now_ms);
+                let report = solver.step(&loads, dt_ms);
+                found.skipped_ms += f64::from(report.skipped_ms);
+                loads.contacts.follow_tool(dt_ms);
+                now_ms += dt_ms.max(1e-4);
+            }
+        }
+        let still = &forces[forces.len() - STILL_MS..];
+        let sizes = still.iter().map(|(force, _)| f64::from(force.length()));
+        found.force_n = sizes.clone().sum::<f64>() / STILL_MS as f64;
+        found.wander_n = sizes.clone().fold(0.0, f64::max) - sizes.fold(f64::INFINITY, f64::min);
+        found.tilt_deg = still.iter().map(|(_, tilt)| *tilt).fold(0.0, f64::max);
+        let upside_down = |tet: &[u32; 4]| {
+            let [a, b, c, d] = tet.map(|n| solver.positions()[n as usize]);
+            (b - a).dot((c - a).cross(d - a)) <= 0.0
+        };
+        found.inverted = mesh.tets.iter().filter(|tet| upside_down(tet)).count() as u32;
+        all.push(found);
+    }
+    Ok((all, [quantile(&mut times_us, 0.5), solver.stable_dt_ms().into()]))
+}
+
+/// Forces of the truth on its finest mesh by radius and depth in mm, N.
+fn truths(radius_mm: f32, membrane_n_per_mm: f32) -> Result<Vec<f64>> {
+    let path = trepan_fixtures::reference_solution("axial").with_extension("csv");
+    let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let rows = text.lines().skip(1).map(|line| line.split(',').map(str::parse::<f64>).collect::<Result<Vec<_>, _>>());
+    let rows = rows.collect::<Result<Vec<_>, _>>().context("a line of axial.csv")?;
+    let is = |a: f64, b: f32| (a - f64::from(b)).abs() < 1e-6;
+    let of = rows.iter().filter(|row| is(row[0], radius_mm) && is(row[1], membrane_n_per_mm));
+    Ok(of.map(|row| row[3]).collect())
+}
+
+fn judge(scene: &Scene, size: (usize, u32), findings: &mut Findings) -> Result<()> {
+    let mesh = block(size)?;
+    let truth = truths(scene.tool.tip_radius_mm, scene.membrane_n_per_mm)?;
+    let (all, [collision_us, dt_ms]) = press(scene, &mesh)?;
+    let edge = edge_mm(&mesh);
+    let what = format!("{}, edge of {edge:.1} mm", scene.name);
+    let worst = |of: fn(&Found) -> f64| all.iter().map(of).fold(0.0, f64::max);
+    let (mut over, mut over_moving, mut judged) = (0.0f64, 0.0f64, 0);
+    for found in &all {
+        let mut row = Row::new(format!("axial press: {}", scene.name), "tled")
+            .with("tets", mesh.tets.len())
+            .with("depth_mm", found.depth_mm)
+            .metric("edge_mm", edge)
+            .metric("force_n", found.force_n)
+            .metric("moving_force_n", found.moving.1)
+            .metric("tilt_deg", found.tilt_deg)
+            .metric("tilt_moving_deg", found.tilt_moving_deg)
+            .metric("wander_n", found.wander_n)
+            .metric("inverted", f64::from(found.inverted))
+            .metric("skipped_ms", found.skipped_ms)
+            .metric("collision_us", collision_us)
+            .metric("stable_dt_ms", dt_ms);
+        if found.depth_mm <= scene.truth_mm
+            && let Some(exact) = truth.get(found.depth_mm as usize - 1)
+        {
+            let (under_mm, moving_n) = found.moving;
+            let at = found.depth_mm as usize - 1;
+            let slope = exact - at.checked_sub(1).map_or(0.0, |before| truth[before]);
+            let exact_moving = exact - slope * (f64::from(found.depth_mm) - under_mm);
+            row = row
+                .metric("force_error_percent", 100.0 * (found.force_n / exact - 1.0))
+                .metric("moving_error_percent", 100.0 * (moving_n / exact_moving - 1.0));
+            over = over.max((found.force_n - exact).abs() / (0.1 * exact).max(0.02));
+            over_moving = over_moving.max((moving_n - exact_moving).abs() / (0.1 * exact_moving).max(0.02));
+            judged += 1;
+        }
+        findings.rows.push(row);
+    }
+    if scene.stiffness_per_mm2 != USUAL {
+        return Ok(());
+    }
+    anyhow::ensure!(judged > 0, "axial.csv lacks a ball of {} mm", scene.tool.tip_radius_mm);
+    findings.gates.extend([
+        Gate::at_most(format!("{what}: force off, over what is allowed"), over, 1.0),
+        Gate::at_most(format!("{what}: force off in motion, over what is allowed"), over_moving, 1.0),
+        Gate::at_most(format!("{what}: tilt of the force at rest, degrees"), worst(|f| f.tilt_deg), 2.0),
+        Gate::at_most(format!("{what}: tilt of the force in motion, degrees"), worst(|f| f.tilt_moving_deg), 5.0),
+        Gate::at_most(format!("{what}: wander of the force at rest, N"), worst(|f| f.wander_n), 1e-3),
+        Gate::at_most(format!("{what}: elements inverted"), worst(|f| f64::from(f.inverted)), 0.0),
+        Gate::at_most(format!("{what}: time skipped, ms"), worst(|f| f.skipped_ms), 0.0),
+    ]);
+    Ok(())
+}
