@@ -14,8 +14,8 @@ use std::fs;
 use std::path::Path;
 
 /// Crates whose constants are those of the program.
-const CRATES: [&str; 9] =
-    ["budget", "contact", "deformable", "haptics", "rigid", "simulator", "soft", "tled", "volume"];
+const CRATES: [&str; 11] =
+    ["bone", "budget", "contact", "deformable", "haptics", "rigid", "simulator", "soft", "stages", "tled", "volume"];
 
 /// Last words of the names of physical quantities.
 const QUANTITIES: [&str; 24] = [

@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 9] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
-    &["voxel-size", "budget", "window", "evidence"],
+    &["voxel-size", "budget", "window", "evidence", "stages"],
     &["simulator"],
     &["craniotomy", "brain", "integrated", "trials-scenes"],
     &["trials-bone", "trials-tissue"],
@@ -33,7 +33,7 @@ const KEPT: [(&str, &[&str]); 8] = [
     ("mcap", &["link"]),
     ("iceoryx2", &["link"]),
     ("clap", &["simulator", "trials"]),
-    ("tracing", &["simulator", "craniotomy", "brain", "integrated"]),
+    ("tracing", &["stages", "simulator", "craniotomy", "brain", "integrated"]),
     ("anyhow", &["evidence", "simulator", "craniotomy", "brain", "integrated", "trials"]),
     ("trepan-trials", &[]),
 ];
@@ -42,7 +42,7 @@ const KEPT: [(&str, &[&str]); 8] = [
 const WORDS: [(&str, &[&str]); 6] = [
     ("Instant::now", &["simulator", "evidence", "trials", "gpu", "window", "render", "emulators"]),
     ("SystemTime", &["link", "simulator", "evidence", "trials"]),
-    ("thread::sleep", &["simulator", "trials", "emulators"]),
+    ("thread::sleep", &["stages", "simulator", "trials", "emulators"]),
     ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
     (
         "std::fs",

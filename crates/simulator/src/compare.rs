@@ -14,7 +14,6 @@ use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::report::chart::{Chart, Curve, over_time};
 use crate::report::page::{Event, render};
-use crate::stages::score::ScoreKeeper;
 use crate::whole::whole;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -22,6 +21,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, TickRecord};
+use trepan_stages::score::ScoreKeeper;
 
 /// Reads two recordings and writes `compare.html` to a folder.
 pub(crate) fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {

@@ -1,10 +1,10 @@
 //! Limits of a hand's device: what its guard, walls and drilling depend on.
 
-use crate::force_scale::ForceScale;
 use serde::{Deserialize, Serialize};
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_haptics::Capabilities;
 use trepan_rigid::removal::RemovalLaw;
+use trepan_stages::force_scale::ForceScale;
 
 /// Device properties that the force guard and the walls depend on; recorded, so that a replay gives
 /// the same forces. Zeros are unknown.

@@ -3,7 +3,6 @@
 use crate::case::plan::Plan;
 use crate::error::SessionError;
 use crate::options::Options;
-use crate::program::Program;
 use crate::run::stop::Stop;
 use crate::run::watch::{Watched, Watching};
 use trepan_geometry::Vec3;
@@ -12,6 +11,7 @@ use trepan_haptics::{
     Capabilities, Clutch, DeviceName, HapticDevice, Motion, OpenedDevice, Setting, ThreadedDevice, Watch, Workspace,
     mouse,
 };
+use trepan_stages::program::Program;
 
 /// An open device of a hand.
 #[derive(Default)]

@@ -4,13 +4,7 @@
 //! # Theory
 //! Three loops run in parallel and exchange their newest values without waiting: the haptic tick at
 //! 1 kHz or more, the collision step and the solver step. A fourth thread renders. The body of each
-//! loop is a stage without a clock:
-//!
-//! | stage | reads | returns |
-//! |---|---|---|
-//! | [`HapticStage::tick`] | device, newest patch | wrench, tool, record |
-//! | [`CollisionStage::step`] | newest tool, newest node positions | patch, contacts, record |
-//! | [`SolverStage::step`] | newest contact | moved nodes, record |
+//! loop is a stage without a clock, in `trepan-stages`.
 //!
 //! `run/threads.rs` runs the stages live; `run/lockstep` replays them from a recording, bit for
 //! bit.
@@ -32,7 +26,6 @@ mod desk;
 mod device_limits;
 mod device_test;
 mod error;
-mod force_scale;
 mod hand;
 mod ingredients;
 mod inspect;
@@ -42,7 +35,6 @@ mod models;
 mod operation;
 mod options;
 mod printable;
-mod program;
 mod progress;
 mod recipe;
 mod recordings;
@@ -54,7 +46,6 @@ mod session_setup;
 mod settings;
 mod show;
 mod solver;
-mod stages;
 mod tissue_class;
 mod training;
 mod uncertainty;
@@ -72,20 +63,14 @@ pub use ingredients::{Effect, Element, Ingredients, Law, Relaxation, SolverDevic
 pub use ingredients::{Variant, of_quality, realistic, variants};
 pub use mixture::body_of;
 pub use options::Options;
-pub use program::{Phase, Program};
 pub use recipe::Recipe;
 pub use report::plan_comparison::PlanComparison;
 pub use report::summary::Summary;
 pub use run::Stages;
 pub use session::Session;
-pub use stages::alarms::Limits;
-pub use stages::collision_step::{CollisionStage, SoftFrame};
-pub use stages::haptic_config::HapticConfig;
-pub use stages::haptic_tick::{HapticStage, TickInput, ToolSample};
-pub use stages::notice::{Hindrance, Notice, Warning, What};
-pub use stages::score::ScoreKeeper;
-pub use stages::settling::{Settling, dry_weight};
-pub use stages::skull_wall::SkullWall;
-pub use stages::solver_step::{SolverFaults, SolverStage};
 pub use tissue_class::{TissueClass, TissueSource};
+pub use trepan_stages::{
+    CollisionStage, HapticConfig, HapticStage, Hindrance, Limits, Notice, Phase, Program, ScoreKeeper, Settling,
+    SkullWall, SoftFrame, SolverFaults, SolverStage, TickInput, ToolSample, Warning, What, dry_weight,
+};
 pub use uncertainty::{Band, Bands};

@@ -2,15 +2,15 @@
 
 use crate::constants;
 use crate::error::SessionError;
-use crate::force_scale::ForceScale;
 use crate::ingredients::{KeyValue, setting};
-use crate::program::Program;
 use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::convert::Infallible;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use trepan_budget::Quality;
+use trepan_stages::force_scale::ForceScale;
+use trepan_stages::program::Program;
 
 /// Numerical range of `--young-modulus-kpa`.
 pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];

@@ -4,11 +4,11 @@
 use crate::case::identity::Identity;
 use crate::error::SessionError;
 use crate::printable::printable;
-use crate::program::Program;
 use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recording, repair};
+use trepan_stages::program::Program;
 
 /// Describes what a recording lacks, with the remedy if there is one; `None` if it is complete.
 pub(crate) fn not_whole(program: Program, file: &Path, recording: &Recording) -> Option<String> {

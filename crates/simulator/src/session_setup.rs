@@ -9,17 +9,10 @@ use crate::error::SessionError;
 use crate::ingredients::{Ingredients, Support};
 use crate::models::Models;
 use crate::operation::Operation;
-use crate::program::Program;
 use crate::remark;
 use crate::report::regions::{Region, regions};
 use crate::run::{self, Stages};
 use crate::solver::{self, SolverInfo};
-use crate::stages::collision_step::CollisionStage;
-use crate::stages::haptic_config::{BONE, HapticConfig, TISSUE, bone_force};
-use crate::stages::haptic_tick::HapticStage;
-use crate::stages::second_hand::SecondHand;
-use crate::stages::settling::Settling;
-use crate::stages::solver_step::SolverStage;
 use std::sync::{Arc, OnceLock};
 use trepan_bone::{BoneVolume, Piece};
 use trepan_budget::Bone;
@@ -28,6 +21,13 @@ use trepan_link::Recording;
 use trepan_measurements::support;
 use trepan_mesh::TetMesh;
 use trepan_rigid::{Extent, Method};
+use trepan_stages::collision_step::CollisionStage;
+use trepan_stages::haptic_config::{BONE, HapticConfig, TISSUE};
+use trepan_stages::haptic_tick::HapticStage;
+use trepan_stages::program::Program;
+use trepan_stages::second_hand::SecondHand;
+use trepan_stages::settling::Settling;
+use trepan_stages::solver_step::SolverStage;
 use trepan_voxel_size::{CostModel, Measures};
 
 /// Patient, plan, settings and models of a session.
@@ -133,7 +133,7 @@ impl SessionSetup {
             rigid: rigid.with_removal(limits.removal(limits.coupled(BONE, tick_ms).stiffness)),
             force_scale: limits.force_scale().0,
             dt_ms: tick_ms,
-            bone_force: bone_force(limits.coupled(BONE, tick_ms), &with, voxel_mm),
+            bone_force: with.bone_models().on(limits.coupled(BONE, tick_ms), voxel_mm),
             tissue_force: limits.coupled(TISSUE, tick_ms),
             guard: limits.guard(),
             opening_needed: self.operation.opening_needed,

@@ -9,7 +9,6 @@ use crate::error::SessionError;
 use crate::ingredients::{Element, Ingredients, Relaxation, SolverDevice};
 use crate::measure::tissue::MASS_ADDED;
 use crate::run::clock::Clock;
-use crate::stages::skull_wall::SkullWall;
 use crate::tissue_class::TissueClass;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +17,7 @@ use trepan_gpu::{Gpu, Prefer};
 use trepan_measurements::pulse;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::{Body, BodyError, Loads, Material, SoftSolver, SurfacePressure};
+use trepan_stages::skull_wall::SkullWall;
 use trepan_tled::gpu::WithSpare;
 use trepan_tled::{Config, Settled, Settling, Tled, choice};
 

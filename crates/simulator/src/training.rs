@@ -5,13 +5,13 @@
 //! `lessons` beside the settings. Targets of steps are read from the running session, pass marks
 //! from its summary. The limits are a teacher's choice; none is validated against clinical skill.
 
-use crate::program::Program;
 use crate::run::View;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use trepan_stages::program::Program;
 
 /// A lesson.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -213,9 +213,9 @@ impl Guide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::flap::FlapPlace;
-    use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::{Pose, ToolState};
+    use trepan_stages::flap::FlapPlace;
+    use trepan_stages::haptic_tick::ToolSample;
 
     #[test]
     fn every_lesson_of_the_program_can_be_read_and_ends() {

@@ -17,10 +17,10 @@
 //! nothing of the error of the method; `--quality` bounds that.
 
 use crate::constants;
-use crate::stages::score::ScoreKeeper;
 use serde::Serialize;
 use trepan_measurements::{Row, drilling, sensitivity};
 use trepan_rigid::removal::Cutter;
+use trepan_stages::score::ScoreKeeper;
 
 /// Stiffness of brain, with its spread between sources.
 pub(crate) const STIFFNESS: Row = sensitivity::SHEAR_MODULUS;
@@ -124,12 +124,12 @@ pub(crate) fn limits() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::haptic_config::TISSUE;
     use crate::tissue_class::TissueClass;
     use trepan_contact::NodalContact;
     use trepan_geometry::Vec3;
     use trepan_rigid::removal::{Pressed, RemovalLaw};
     use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+    use trepan_stages::haptic_config::TISSUE;
     use trepan_tled::{Config, Settling, Tled};
 
     /// Force of a block on a hand 5 mm past its surface, N, and how far that gave way, mm.

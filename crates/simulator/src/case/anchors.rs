@@ -23,7 +23,6 @@
 
 use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, below};
-use crate::stages::skull_wall::SkullWall;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_deformable::{BorderNode, ConfigError};
@@ -31,6 +30,7 @@ use trepan_geometry::{Vec3, units::mpa_from_kpa};
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::Anchor;
+use trepan_stages::skull_wall::SkullWall;
 
 /// Thickness of the layer from which it holds nothing, a cistern or the spinal canal, and below
 /// which it counts as that thick, mm; numerical.

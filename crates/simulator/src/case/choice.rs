@@ -7,12 +7,12 @@ use crate::case::{Case, Inputs, folder, import};
 use crate::error::SessionError;
 use crate::models::{self, Facts, ModelRequest, Models};
 use crate::options::{Options, Patient};
-use crate::program::Program;
 use crate::progress::Progress;
 use crate::recipe::Recipe;
 use crate::tissue_class::TissueClass;
 use std::path::Path;
 use trepan_budget::Setup;
+use trepan_stages::program::Program;
 
 /// Opens the named case folder, the given images or the built-in case, with the models of the
 /// session. `card`: whether a graphics card draws.

@@ -26,7 +26,6 @@ use crate::measure::tissue::{Fineness, Shape};
 use crate::measure::{CaseErrors, Sight};
 use crate::models::Facts;
 use crate::printable::count;
-use crate::program::Program;
 use crate::progress::Progress;
 use crate::recipe::Recipe;
 use crate::remark::WELL;
@@ -40,6 +39,7 @@ use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
+use trepan_stages::program::Program;
 use trepan_volume::{Islands, VoxelVolume, bone_isovalue, leans, overlap, skull_only};
 
 /// Opens a case: from the cache if it was built before, else from the files, with a progress bar.

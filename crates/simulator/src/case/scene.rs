@@ -4,7 +4,6 @@ use crate::case::opening::{bare_brain, bone_of};
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
 use crate::mixture::{self, Shares};
-use crate::program::Program;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, IVec3};
 use std::sync::Arc;
@@ -14,6 +13,7 @@ use trepan_haptics::script::Site;
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::{Anchor, Body, Material, Membrane};
+use trepan_stages::program::Program;
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Distance to bone below which surface nodes of the lower brain are fixed, mm.

@@ -10,7 +10,6 @@ mod old_header;
 
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
-use crate::force_scale::ForceScale;
 use crate::ingredients::Ingredients;
 use crate::measure::Parts;
 use crate::operation::Operation;
@@ -20,6 +19,7 @@ use serde_json::{Number, Value};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
+use trepan_stages::force_scale::ForceScale;
 
 /// Everything that a session's forces depend on, with the reasons for its models.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

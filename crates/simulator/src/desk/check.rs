@@ -15,7 +15,6 @@ use crate::desk::form::Form;
 use crate::desk::pages::{across_mm, by_controls, images};
 use crate::error::SessionError;
 use crate::printable::printable;
-use crate::program::Program;
 use crate::settings::Source;
 use crate::tissue_class::TissueClass;
 use glam::{DAffine3, DVec3, Vec2};
@@ -25,6 +24,7 @@ use trepan_geometry::{Aabb, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Site;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
+use trepan_stages::program::Program;
 use trepan_volume::VoxelVolume;
 use trepan_window::{Amount, Choosable, Drag, Item, Page, Picture};
 

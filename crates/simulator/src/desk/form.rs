@@ -4,12 +4,12 @@ use crate::desk::browse::Goal;
 use crate::desk::language::Languages;
 use crate::error::SessionError;
 use crate::options::{Options, Patient};
-use crate::program::{Program, called};
 use crate::settings::{Images, Recent, Settings, Source, sessions};
 use crate::tissue_class::{TissueClass, TissueSource};
 use std::path::{Path, PathBuf};
 use trepan_budget::Quality;
 use trepan_haptics::{Listed, script};
+use trepan_stages::program::{Program, called};
 use trepan_window::Choosable;
 
 /// The start page as it is filled in.

@@ -6,12 +6,10 @@ use super::*;
 use crate::desk::action::Action;
 use crate::desk::browse::Goal;
 use crate::desk::job::USUAL_S;
-use crate::program::Phase;
 use crate::run::lesson::TEACHER_REQUESTS;
 use crate::settings::{Images, Recent, Source};
 use crate::show::notice_text;
 use crate::show::window::{NOT_IN_HAND, SWITCHES, TEACH};
-use crate::stages::notice::{Hindrance, Notice, Warning, What};
 use crate::training::Lesson;
 use crate::{Inputs, TissueSource};
 use clap::Parser;
@@ -23,6 +21,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_gpu::GpuError;
 use trepan_render::Image;
+use trepan_stages::notice::{Hindrance, Notice, Warning, What};
+use trepan_stages::program::Phase;
 use trepan_window::{Host, Pages, missing, speak, tr};
 
 /// Sizes of the window, pixels, and its scale.

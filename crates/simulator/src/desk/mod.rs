@@ -23,10 +23,10 @@ pub(crate) use job::Done;
 
 use crate::error::SessionError;
 use crate::options::Options;
-use crate::program::Program;
 use crate::run::stop::Stop;
 use crate::show::driver;
 use crate::{Inputs, desk::language::Languages, desk::state::App};
+use trepan_stages::program::Program;
 use trepan_window as window;
 
 /// Runs the program in a window until it is closed; returns what the last session came to.

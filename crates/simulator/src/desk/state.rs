@@ -17,7 +17,6 @@ use crate::desk::pictures::Pictures;
 use crate::desk::results::{self, Sessions};
 use crate::error::SessionError;
 use crate::options::Options;
-use crate::program::Program;
 use crate::progress::Progress;
 use crate::report::kept::SessionFolder;
 use crate::run::stop::Stop;
@@ -29,6 +28,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::Listed;
+use trepan_stages::program::Program;
 use trepan_window::{Content, Host, Page, Stage, speak};
 
 /// What the window shows.

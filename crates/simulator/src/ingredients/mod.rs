@@ -21,6 +21,7 @@ use clap::ValueEnum;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use trepan_measurements::fits;
+use trepan_stages::BoneModels;
 
 /// What the models of a session are made of; `None` where `--quality` chooses.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,6 +150,11 @@ impl Ingredients {
     /// card has no sleeping elements.
     pub(crate) fn steps_all(&self) -> bool {
         self.relaxation != Relaxation::Off || self.device != SolverDevice::Cpu
+    }
+
+    /// Those of the force of bone.
+    pub(crate) fn bone_models(&self) -> BoneModels {
+        BoneModels { friction: self.bone_friction, shading: self.shading, vibration: self.vibration }
     }
 }
 

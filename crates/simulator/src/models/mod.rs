@@ -27,9 +27,7 @@ use crate::ingredients::{Element, Ingredients};
 use crate::measure::{self, CaseErrors, Parts, PlannedParts};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
-use crate::program::Program;
 use crate::recipe::Recipe;
-use crate::stages::haptic_config::BONE_STIFFNESS;
 use crate::tissue_class::TissueClass;
 use crate::uncertainty;
 use overrides::{Overrides, written};
@@ -37,6 +35,8 @@ use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
 use trepan_soft::Material;
+use trepan_stages::haptic_config::BONE_STIFFNESS;
+use trepan_stages::program::Program;
 
 /// The models of a session, with the reasons for them.
 #[derive(Clone, Debug)]

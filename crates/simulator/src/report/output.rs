@@ -1,7 +1,6 @@
 //! Writes the output files of a session, each of them atomically.
 
 use crate::error::SessionError;
-use crate::program::Program;
 use crate::report::debrief::Debrief;
 use crate::report::drilled::{self, Drilled};
 use crate::report::page::{self, Shot};
@@ -18,6 +17,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use trepan_bone::BoneVolume;
 use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
+use trepan_stages::program::Program;
 use trepan_volume::{VoxelVolume, write_beside};
 
 /// Files that a session writes into its folder, besides pictures.

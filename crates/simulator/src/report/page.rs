@@ -3,7 +3,6 @@
 
 use crate::constants;
 use crate::error::SessionError;
-use crate::force_scale::ForceScale;
 use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
@@ -19,6 +18,7 @@ use serde_json::json;
 use trepan_budget::Tissue;
 use trepan_link::Recording;
 use trepan_link::wire::TickRecord;
+use trepan_stages::force_scale::ForceScale;
 
 /// A picture for the report.
 #[derive(Clone, Debug)]
@@ -276,8 +276,8 @@ fn add_rows(path: &str, value: &serde_json::Value, into: &mut Vec<Row>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::notice::{Notice, Warning, What};
     use trepan_link::wire::EventRecord;
+    use trepan_stages::notice::{Notice, Warning, What};
 
     #[test]
     fn events_are_in_order_and_complete() {

@@ -5,17 +5,17 @@ use crate::models::ModelSummary;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
 use crate::run::{Outcome, Quantiles, Replayed, SolverOutcome};
-use crate::stages::alarms::REAL_TIME;
-use crate::stages::by_cause;
-use crate::stages::notice::{Notice, What};
-use crate::stages::score::ScoreKeeper;
-use crate::stages::second_hand::SecondOutcome;
 use crate::uncertainty::Bands;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use trepan_bone::Piece;
 use trepan_contact::GuardCounters;
+use trepan_stages::alarms::REAL_TIME;
+use trepan_stages::by_cause;
+use trepan_stages::notice::{Notice, What};
+use trepan_stages::score::ScoreKeeper;
+use trepan_stages::second_hand::SecondOutcome;
 
 /// The whole file.
 #[derive(Clone, Debug, Default, Serialize)]

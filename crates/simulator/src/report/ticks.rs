@@ -7,9 +7,7 @@
 
 use crate::config::SessionConfig;
 use crate::error::SessionError;
-use crate::force_scale::ForceScale;
 use crate::printable::{count, printable};
-use crate::program::{Phase, Program};
 use crate::report::csv;
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write};
@@ -17,6 +15,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::stream;
 use trepan_link::wire::{SessionHeader, TickRecord};
+use trepan_stages::force_scale::ForceScale;
+use trepan_stages::program::{Phase, Program};
 
 /// One row: a tick, and what was summed since the row before.
 struct Sampled<'a> {

@@ -22,7 +22,6 @@
 
 use crate::run::View;
 use crate::run::stop::Stop;
-use crate::stages::notice::Notice;
 use glam::IVec3;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -31,6 +30,7 @@ use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_link::cell::Reader;
 use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
+use trepan_stages::notice::Notice;
 use trepan_volume::VoxelVolume;
 
 /// Session time between two shots, ms.
@@ -228,10 +228,10 @@ fn places(low: [usize; 3], dims: [usize; 3]) -> impl Iterator<Item = (usize, usi
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::program::Program;
-    use crate::stages::haptic_tick::ToolSample;
     use trepan_bone::CUT_SURFACE;
     use trepan_geometry::{Pose, ToolState};
+    use trepan_stages::haptic_tick::ToolSample;
+    use trepan_stages::program::Program;
     use trepan_volume::AIR_HU;
 
     /// Returns the view of a tool at the origin.

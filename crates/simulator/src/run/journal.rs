@@ -7,16 +7,16 @@
 //! scores are recorded as numbers once a second and at the end, for viewers of the file. A full
 //! disk ends the recording, not the session.
 
-use crate::force_scale::ForceScale;
 use crate::run::clock::Clock;
 use crate::run::watch::Share;
-use crate::stages::notice::{Notice, What};
-use crate::stages::score::ScoreKeeper;
-use crate::stages::solver_step::cheaper_text;
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder};
+use trepan_stages::force_scale::ForceScale;
+use trepan_stages::notice::{Notice, What};
+use trepan_stages::score::ScoreKeeper;
+use trepan_stages::solver_step::cheaper_text;
 
 /// Capacity of a ring buffer, records.
 const RING: usize = 8192;

@@ -12,19 +12,10 @@ pub(crate) mod stop;
 pub(crate) mod threads;
 pub(crate) mod watch;
 
-use crate::force_scale::ForceScale;
-use crate::program::Program;
 use crate::run::film::{Filming, Shot};
 use crate::run::journal::Written;
 use crate::run::stop::Stop;
 use crate::run::watch::Share;
-use crate::stages::collision_step::{CollisionStage, SoftFrame};
-use crate::stages::flap::FlapPlace;
-use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
-use crate::stages::notice::{Notice, What};
-use crate::stages::score::ScoreKeeper;
-use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
-use crate::stages::solver_step::{SolverFaults, SolverStage};
 use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
@@ -34,6 +25,15 @@ use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::wire::TickRecord;
 use trepan_link::{Recorder, SceneWriter};
 use trepan_soft::Loads;
+use trepan_stages::collision_step::{CollisionStage, SoftFrame};
+use trepan_stages::flap::FlapPlace;
+use trepan_stages::force_scale::ForceScale;
+use trepan_stages::haptic_tick::{HapticStage, Tick, ToolSample};
+use trepan_stages::notice::{Notice, What};
+use trepan_stages::program::Program;
+use trepan_stages::score::ScoreKeeper;
+use trepan_stages::second_hand::{SecondHand, SecondOutcome, SecondView};
+use trepan_stages::solver_step::{SolverFaults, SolverStage};
 
 /// What a live session and a replay need.
 pub(crate) struct Run<'a> {

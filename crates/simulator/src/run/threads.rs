@@ -17,9 +17,6 @@ use crate::run::clock::{Clock, Schedule, Waits};
 use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
 use crate::run::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
-use crate::stages::alarms;
-use crate::stages::haptic_tick::{HapticStage, Tick, TickInput};
-use crate::stages::second_hand::{SecondHand, SecondView};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
@@ -30,6 +27,9 @@ use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_soft::Loads;
+use trepan_stages::alarms;
+use trepan_stages::haptic_tick::{HapticStage, Tick, TickInput};
+use trepan_stages::second_hand::{SecondHand, SecondView};
 
 /// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;

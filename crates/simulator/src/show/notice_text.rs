@@ -1,11 +1,11 @@
 //! Texts of the window's panel, live and in a replay: phase, tool, forces, warnings.
 
 use crate::printable::capital;
-use crate::program::{Phase, Program, called};
 use crate::run::View;
-use crate::stages::notice::{Notice, Warning};
 use crate::uncertainty::Band;
 use trepan_geometry::{Buttons, Tool};
+use trepan_stages::notice::{Notice, Warning};
+use trepan_stages::program::{Phase, Program, called};
 use trepan_window::{Choice, Panel, Sound};
 
 /// Time for which a notice is shown, ms.
@@ -126,10 +126,10 @@ pub(crate) fn hint(phase: Phase, by_hand: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force_scale::ForceScale;
-    use crate::stages::haptic_tick::ToolSample;
-    use crate::stages::notice::What;
     use trepan_geometry::{Pose, ToolState, Vec3};
+    use trepan_stages::force_scale::ForceScale;
+    use trepan_stages::haptic_tick::ToolSample;
+    use trepan_stages::notice::What;
 
     fn view(warnings: u32) -> View {
         let tool = Program::Integrated.tray()[1];

@@ -10,12 +10,12 @@ use crate::run::stop::Stop;
 use crate::run::{RenderInputs, Times, View};
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
-use crate::stages::second_hand::SecondHand;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;
 
 /// Half the height of a slice's view around the tool, mm.

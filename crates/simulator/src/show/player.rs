@@ -8,7 +8,6 @@
 //! The brain's nodes are interpolated between the shots that hold them.
 
 use crate::printable::capital;
-use crate::program::Program;
 use crate::run::View;
 use crate::run::film::{Shot, position};
 use crate::run::lockstep::up_to;
@@ -16,7 +15,6 @@ use crate::run::stop::Stop;
 use crate::show::notice_text::NEWS_MS;
 use crate::show::picture::Album;
 use crate::show::window::{self, SessionView, ViewState};
-use crate::stages::second_hand::SecondView;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use trepan_bone::BoneVolume;
@@ -24,6 +22,8 @@ use trepan_geometry::Vec3;
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::{Camera, Frame, Image, Painter};
+use trepan_stages::program::Program;
+use trepan_stages::second_hand::SecondView;
 use trepan_window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
 
 /// Largest number of voxels and nodes written per picture: some 10 ms.

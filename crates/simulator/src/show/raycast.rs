@@ -5,14 +5,14 @@
 //! brain's triangles are tested one by one: all of them for a line of sight, those around the tool
 //! for the short rays below it.
 
-use crate::program::Phase;
 use crate::run::View;
 use crate::session_setup::SessionSetup;
-use crate::stages::ahead::{bone_ahead_mm, density};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Vec3};
 use trepan_mesh::Surface;
+use trepan_stages::ahead::{bone_ahead_mm, density};
+use trepan_stages::program::Phase;
 use trepan_window::{Panel, Ray, SurfaceHit};
 
 /// Distance from the tool within which short rays meet the brain, mm.

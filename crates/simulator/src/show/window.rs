@@ -5,7 +5,6 @@
 //! mouse pose at its own rate. Closing the window ends the session.
 
 use crate::SessionError;
-use crate::program::Program;
 use crate::progress::Progress;
 use crate::report::page::Shot;
 use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
@@ -18,7 +17,6 @@ use crate::show::keep::Keeper;
 use crate::show::notice_text;
 use crate::show::picture::{Album, Moving, first_view, frame, microscope, snap};
 use crate::show::raycast::Raycast;
-use crate::stages::notice::Notice;
 use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
@@ -26,6 +24,8 @@ use trepan_haptics::mouse::MouseHandle;
 use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_stages::notice::Notice;
+use trepan_stages::program::Program;
 use trepan_window::{self as window, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
 
 /// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
@@ -424,10 +424,10 @@ fn teach(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
 mod tests {
     use super::*;
     use crate::run::watch::tests::connected;
-    use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::ToolState;
     use trepan_haptics::HapticDevice;
     use trepan_link::cell::cell;
+    use trepan_stages::haptic_tick::ToolSample;
     use trepan_window::Pace;
 
     #[test]

@@ -5,18 +5,18 @@ use crate::case::opening::Opening;
 use crate::case::{Brain, Case};
 use crate::config::SessionConfig;
 use crate::device_limits::DeviceLimits;
-use crate::force_scale::ForceScale;
 use crate::ingredients::{KEYS, SolverDevice};
 use crate::measure::CaseErrors;
 use crate::models::{Facts, ModelRequest};
 use crate::operation::Operation;
 use crate::options::Options;
-use crate::program::{Phase, Program};
 use crate::session_setup::SessionSetup;
 use clap::Parser;
 use trepan_geometry::{Quat, ToolKind, Vec3};
 use trepan_haptics::{Capabilities, DeviceName};
 use trepan_soft::boxes;
+use trepan_stages::force_scale::ForceScale;
+use trepan_stages::program::{Phase, Program};
 use trepan_volume::VoxelVolume;
 
 /// Length of the operation, ms, and when the probe is taken.

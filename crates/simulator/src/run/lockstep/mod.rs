@@ -23,9 +23,6 @@ use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::{
     Cells, Numbered, Outcome, RenderInputs, Replayed, Run, SolverOutcome, Stages, Ticks, Times, Tissue, View,
 };
-use crate::stages::collision_step::SoftFrame;
-use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
-use crate::stages::second_hand::{SecondHand, SecondView};
 use std::collections::VecDeque;
 use std::sync::mpsc::channel;
 use std::thread;
@@ -35,6 +32,9 @@ use trepan_haptics::{Reading, Status};
 use trepan_link::Recording;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_soft::Loads;
+use trepan_stages::collision_step::SoftFrame;
+use trepan_stages::haptic_tick::{HapticStage, TickInput, ToolSample};
+use trepan_stages::second_hand::{SecondHand, SecondView};
 
 /// Number of past tools, patches and loads that are kept for steps that refer to them.
 const MEMORY: usize = 16_384;
@@ -334,13 +334,13 @@ mod ingredients;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force_scale::ForceScale;
-    use crate::program::Program;
-    use crate::stages::haptic_config::HapticConfig;
-    use crate::stages::notice::{Hindrance, What};
     use std::sync::Arc;
     use trepan_bone::BoneVolume;
     use trepan_geometry::Vec3;
+    use trepan_stages::force_scale::ForceScale;
+    use trepan_stages::haptic_config::HapticConfig;
+    use trepan_stages::notice::{Hindrance, What};
+    use trepan_stages::program::Program;
     use trepan_volume::VoxelVolume;
 
     #[test]

@@ -11,7 +11,7 @@ use trepan_geometry::{Buttons, Tool, ToolKind};
 
 /// The program's tools and the present one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tray {
+pub struct Tray {
     program: Program,
     slot: usize,
     last_request: (bool, Option<ToolKind>, Option<usize>),
@@ -19,7 +19,7 @@ pub(crate) struct Tray {
 
 /// Result of a request for a tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Change {
+pub enum Change {
     /// The tool was changed.
     Taken,
     /// The request was refused: the bone is not open.

@@ -18,7 +18,7 @@
 //! nothing cuts, no tool is changed and no flap moves. The largest stroke takes half a second at 1
 //! kHz, a burr hole a few ticks. The result depends on the ticks alone; nothing allocates.
 
-use crate::stages::notice::Hindrance;
+use crate::notice::Hindrance;
 use trepan_bone::{BoneVolume, MAX_STROKES};
 use trepan_geometry::{Pose, Tool, Vec3};
 
@@ -31,7 +31,7 @@ const WAIT: [u32; 2] = [4000, 100];
 
 /// Data of a stroke besides its bone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Stroke {
+pub struct Stroke {
     /// Bone removed, mm³.
     pub mm3: f32,
     /// Number of times that the burr came through.
@@ -42,7 +42,7 @@ pub(crate) struct Stroke {
 
 /// Result of a request to undo.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Answer {
+pub enum Answer {
     /// The stroke is undone.
     Back(Stroke),
     /// The stroke that was undone last is redone.
@@ -67,7 +67,7 @@ enum State {
 
 /// A tool and its pose.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub struct Place {
     /// The tool.
     pub tool: Tool,
     /// Pose of the proxy.
@@ -78,7 +78,7 @@ pub(crate) struct Place {
 
 /// Strokes that can be undone.
 #[derive(Clone, Debug)]
-pub(crate) struct Undo {
+pub struct Undo {
     at: State,
     /// Whether undo and redo were pressed in the last tick.
     was_requested: [bool; 2],

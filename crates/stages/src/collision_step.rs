@@ -8,10 +8,10 @@
 //! surface pressure it does so from the start. The stage has no clock; the same tools and positions
 //! give the same results.
 
+use crate::haptic_tick::ToolSample;
 use crate::program::{Phase, Program};
-use crate::stages::haptic_tick::ToolSample;
-use crate::stages::settling::Settling;
-use crate::stages::skull_wall::SkullWall;
+use crate::settling::Settling;
+use crate::skull_wall::SkullWall;
 use trepan_contact::{MAX_SPRINGS, NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, MeshCollision, NodeContact, TissueCollision, TissueStep};
 use trepan_geometry::{Tool, Vec3};
@@ -169,7 +169,7 @@ impl CollisionStage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::haptic_tick::ToolSample;
+    use crate::haptic_tick::ToolSample;
     use trepan_geometry::{Pose, ToolState};
     use trepan_soft::boxes;
 

@@ -38,7 +38,7 @@ const PAUSE_MS: f64 = 1000.0;
 
 /// Sums over a movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Motion {
+pub struct Motion {
     /// Length of the tip's path, mm.
     pub path_mm: f64,
     /// Time in which the tip moved slower than 5 mm/s, s.

@@ -8,7 +8,7 @@ use trepan_contact::SurfacePatch;
 use trepan_geometry::{Buttons, Pose, Quat, ToolKind, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{HapticConfig, HapticStage, Hindrance, Notice, Phase, Program, TickInput, Warning, What};
+use trepan_stages::{HapticConfig, HapticStage, Hindrance, Notice, Phase, Program, TickInput, Warning, What};
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Makes a flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.

@@ -23,7 +23,7 @@ const CLEAR_MS: f32 = 200.0;
 
 /// Returns the reading of a device, or its last valid one at rest and `true` if it gave no usable
 /// pose.
-pub(crate) fn last_valid_state(reading: &Reading, last: ToolState) -> (ToolState, bool) {
+pub fn last_valid_state(reading: &Reading, last: ToolState) -> (ToolState, bool) {
     let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
     let at_rest = ToolState { twist: Twist::default(), time_ms: reading.tool.time_ms, ..last };
     (if fresh { reading.tool } else { at_rest }, !fresh)
@@ -31,7 +31,7 @@ pub(crate) fn last_valid_state(reading: &Reading, last: ToolState) -> (ToolState
 
 /// Status of the device and its tool in a tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct DeviceStatus {
+pub struct DeviceStatus {
     /// The device is lost.
     pub lost: bool,
     /// The device gave no fresh pose.
@@ -42,7 +42,7 @@ pub(crate) struct DeviceStatus {
 
 /// State of the force after faults of a device.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct AfterFault {
+pub struct AfterFault {
     waits: bool,
     /// Whether the device has ever given a pose.
     known: bool,

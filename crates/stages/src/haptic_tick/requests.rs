@@ -1,13 +1,13 @@
 //! Requests by buttons: cutting, changing the tool, undoing a stroke, moving the flap.
 
 use super::HapticStage;
+use crate::drill::Drill;
+use crate::flap::Flap;
+use crate::notice::{Hindrance, What};
 use crate::program::Phase;
-use crate::stages::drill::Drill;
-use crate::stages::flap::Flap;
-use crate::stages::notice::{Hindrance, What};
-use crate::stages::second_hand::SecondHand;
-use crate::stages::tray::Change;
-use crate::stages::undo::{Answer, Place, Stroke};
+use crate::second_hand::SecondHand;
+use crate::tray::Change;
+use crate::undo::{Answer, Place, Stroke};
 use trepan_geometry::{Buttons, Pose, ToolKind, ToolState, Vec3};
 
 /// Ends of the line along the shaft on which a piece of bone is lifted, from the tip, mm.

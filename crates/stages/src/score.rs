@@ -10,7 +10,7 @@
 //! They are physical quantities; none is validated against clinical skill.
 
 use crate::force_scale::ForceScale;
-use crate::stages::motion::Motion;
+use crate::motion::Motion;
 use serde::Serialize;
 use trepan_geometry::Vec3;
 use trepan_link::wire::TickRecord;
@@ -65,10 +65,10 @@ pub struct ScoreKeeper {
     /// How far the hand was past the brain's rest surface at the largest force of the tissue, and
     /// how deep in its present surface, mm.
     #[serde(skip)]
-    pub(crate) peak_tissue: [f32; 2],
+    pub peak_tissue: [f32; 2],
     /// Force of bone on the hand while it is cut, integrated over time, N s, and that time, s.
     #[serde(skip)]
-    pub(crate) cutting: [f64; 2],
+    pub cutting: [f64; 2],
     /// Time of undoing and redoing, ms.
     #[serde(skip)]
     undoing_ms: f64,
@@ -96,13 +96,13 @@ const REST_MM: f32 = 0.5;
 
 /// Whether a tool for bone is past the brain's rest surface. This is a touch of the brain in
 /// warnings and scores.
-pub(crate) fn cuts_into_brain(record: &TickRecord) -> bool {
+pub fn cuts_into_brain(record: &TickRecord) -> bool {
     record.phase == 0 && record.brain_distance_mm <= 0.0
 }
 
 impl ScoreKeeper {
     /// Makes the sums of a session whose device has a force scale.
-    pub(crate) fn at(force_scale: ForceScale) -> Self {
+    pub fn at(force_scale: ForceScale) -> Self {
         Self { force_scale, ..Self::default() }
     }
 

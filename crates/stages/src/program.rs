@@ -111,7 +111,7 @@ const TRAY: [Tool; 6] =
     [Tool::burr(3.0), Tool::burr(2.0), Tool::perforator(), Tool::craniotome(), Tool::probe(2.0), Tool::spatula()];
 
 /// Name of a tool in the tray: its kind and width.
-pub(crate) fn called(tool: &Tool) -> String {
+pub fn called(tool: &Tool) -> String {
     match tool.kind {
         ToolKind::Burr | ToolKind::Perforator => format!("{} {:.0} mm", tool.kind.name(), 2.0 * tool.tip_radius_mm),
         kind => kind.name().into(),

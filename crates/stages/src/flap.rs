@@ -9,7 +9,7 @@
 //! the CT shows in the cut beside the flap goes with it: else the density between the two would
 //! leave a thin wall.
 
-use crate::stages::notice::{Hindrance, What};
+use crate::notice::{Hindrance, What};
 use glam::IVec3;
 use trepan_bone::{BoneVolume, FlapSearch, FlapState};
 use trepan_geometry::{Buttons, Vec3};
@@ -39,7 +39,7 @@ enum State {
 
 /// Where the flap is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum FlapPlace {
+pub enum FlapPlace {
     /// Attached to the skull, or not known to be free.
     #[default]
     Attached,
@@ -58,7 +58,7 @@ struct Lifted {
 
 /// The flap of an operation.
 #[derive(Clone, Debug)]
-pub(crate) struct Flap {
+pub struct Flap {
     search: FlapSearch,
     planned: bool,
     at: State,

@@ -9,7 +9,7 @@
 //! solver of the same body goes on from the same state; the record of its first step says so, and
 //! a replay changes at the same step.
 
-use crate::stages::collision_step::SoftFrame;
+use crate::collision_step::SoftFrame;
 use serde::Serialize;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
@@ -20,9 +20,9 @@ use trepan_link::wire::SolverRecord;
 use trepan_soft::{Loads, MakeSolver, SoftSolver, StepReport};
 
 /// Steps between two records while the contact is unchanged.
-pub(crate) const EACH: u64 = 32;
+pub const EACH: u64 = 32;
 /// Limit for the motion of a node in a step while no tool touches the brain, mm.
-pub(crate) const REST_MOTION_MM: f32 = 0.02;
+pub const REST_MOTION_MM: f32 = 0.02;
 /// Longest time in which contacts follow a tool of which nothing new is heard, ms.
 const FOLLOWED_MS: f32 = 2.0;
 /// Time after the last touch in which the brain may still move back, ms.
@@ -149,7 +149,7 @@ impl Maker {
 }
 
 /// Says that a cheaper solver steps from some simulated time on, ms.
-pub(crate) fn cheaper_text(from_ms: f64) -> String {
+pub fn cheaper_text(from_ms: f64) -> String {
     format!(
         "the processor was too slow for the brain: from {:.1} s on its solver took longer steps, and a fast press \
          feels heavier; close programs, or take a lower quality",

@@ -15,10 +15,10 @@
 //! # When not to use it
 //! To retract the brain: use the first hand.
 
-use crate::stages::by_cause;
-use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
-use crate::stages::haptic_config::HapticConfig;
-use crate::stages::notice::{Notice, What};
+use crate::by_cause;
+use crate::fault::{AfterFault, DeviceStatus, last_valid_state};
+use crate::haptic_config::HapticConfig;
+use crate::notice::{Notice, What};
 use serde::Serialize;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
@@ -31,7 +31,7 @@ use trepan_volume::DistanceField;
 
 /// State of the second hand as it is rendered.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SecondView {
+pub struct SecondView {
     /// Pose of the proxy.
     pub world_from_tool: Pose,
     /// Force on the hand, N.

@@ -5,20 +5,20 @@
 //! burr opens the bone and no bone is left ahead: with bone ahead the hole is a pore. Undoing is in
 //! `undo.rs`.
 
-use crate::stages::ahead::bone_ahead_mm;
+use crate::ahead::bone_ahead_mm;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
 use trepan_measurements::drilling;
 use trepan_rigid::RigidStep;
 
 /// Remaining bone under which a warning is raised, mm.
-pub(crate) const THIN_MM: f32 = drilling::THIN_BONE.f32();
+pub const THIN_MM: f32 = drilling::THIN_BONE.f32();
 /// Remaining bone at which the burr is about to break through, mm.
-pub(crate) const BREAK_MM: f32 = drilling::BREAK_THROUGH.f32();
+pub const BREAK_MM: f32 = drilling::BREAK_THROUGH.f32();
 
 /// The present stroke.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Drill {
+pub struct Drill {
     drilled: bool,
     /// Whether the burr has come through the bone in this stroke.
     through: bool,
@@ -53,11 +53,11 @@ impl Drill {
 }
 
 /// Largest remaining bone that is measured, mm.
-pub(crate) const REACH_MM: f32 = 2.0;
+pub const REACH_MM: f32 = 2.0;
 
 /// Returns the remaining bone ahead of a cutting burr, mm, at most [`REACH_MM`]: the smaller value
 /// along its axis and along the direction of pressing.
-pub(crate) fn remaining_thickness_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
+pub fn remaining_thickness_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
     let ahead = |way: Vec3| {
         let front = world_from_tool.translation + tool.tip_radius_mm * way;
         bone_ahead_mm(bone, front, way, REACH_MM)

@@ -1,19 +1,18 @@
 //! Configuration of the haptic tick of either hand.
 
-use crate::ingredients::Ingredients;
+use crate::alarms::Limits;
 use crate::program::Program;
-use crate::stages::alarms::Limits;
 use trepan_contact::{ForceShading, Friction, GuardConfig, Vibration, Viscoelastic};
 use trepan_measurements::{drilling, hands};
 use trepan_rigid::{Method, removal::FORCE_SCALE};
 
 /// Stiffness of the contact with bone, N/mm.
-pub(crate) const BONE_STIFFNESS: f32 = drilling::CONTACT_STIFFNESS.f32();
+pub const BONE_STIFFNESS: f32 = drilling::CONTACT_STIFFNESS.f32();
 /// Contact with bone of a hand that no device limits.
-pub(crate) const BONE: Viscoelastic =
+pub const BONE: Viscoelastic =
     Viscoelastic { stiffness: BONE_STIFFNESS, damping: drilling::CONTACT_DAMPING_UNLIMITED.f32() };
 /// Contact with tissue of a hand that no device limits.
-pub(crate) const TISSUE: Viscoelastic =
+pub const TISSUE: Viscoelastic =
     Viscoelastic { stiffness: hands::TISSUE_STIFFNESS.f32(), damping: hands::TISSUE_DAMPING_UNLIMITED.f32() };
 
 /// Configuration of a haptic stage.
@@ -49,7 +48,7 @@ impl HapticConfig {
             rigid: Method::RECOMMENDED,
             force_scale: FORCE_SCALE,
             dt_ms: 1.0,
-            bone_force: bone_force(BONE, &Ingredients::default(), 0.0),
+            bone_force: BoneModels::default().on(BONE, 0.0),
             tissue_force: TISSUE,
             guard: GuardConfig::default(),
             limits: Limits::default(),
@@ -59,10 +58,23 @@ impl HapticConfig {
     }
 }
 
-/// Force of bone on voxels of an edge, mm, with the session's ingredients on a spring and damper.
-pub(crate) fn bone_force(wall: Viscoelastic, with: &Ingredients, voxel_mm: f32) -> Vibration<ForceShading<Friction>> {
-    let friction = Friction::new(wall, wall.stiffness, with.bone_friction, with.bone_friction);
-    let shaded = ForceShading::new(friction, if with.shading { voxel_mm } else { 0.0 });
-    let drill = Vibration::drill(shaded);
-    if with.vibration { drill } else { Vibration::new(shaded, 0.0, drill.frequency_hz) }
+/// What acts on the force of bone beside its spring and damper; nothing by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BoneModels {
+    /// Friction coefficient of a tool that does not cut, without unit.
+    pub friction: f32,
+    /// Force shading over one voxel.
+    pub shading: bool,
+    /// Vibration of the drill.
+    pub vibration: bool,
+}
+
+impl BoneModels {
+    /// Force of bone on voxels of an edge, mm, with these models on a spring and damper.
+    pub fn on(&self, wall: Viscoelastic, voxel_mm: f32) -> Vibration<ForceShading<Friction>> {
+        let friction = Friction::new(wall, wall.stiffness, self.friction, self.friction);
+        let shaded = ForceShading::new(friction, if self.shading { voxel_mm } else { 0.0 });
+        let drill = Vibration::drill(shaded);
+        if self.vibration { drill } else { Vibration::new(shaded, 0.0, drill.frequency_hz) }
+    }
 }

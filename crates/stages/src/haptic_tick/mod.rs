@@ -25,17 +25,17 @@
 
 mod requests;
 
+use crate::alarms::{Feed, Pace, WarningInputs};
+use crate::drill::{Drill, REACH_MM, remaining_thickness_mm};
+use crate::fault::{AfterFault, DeviceStatus, last_valid_state};
+use crate::flap::{Flap, FlapPlace};
 use crate::force_scale::ForceScale;
+use crate::haptic_config::HapticConfig;
+use crate::notice::{Notice, Watch, What};
 use crate::program::Phase;
-use crate::stages::alarms::{Feed, Pace, WarningInputs};
-use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm};
-use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
-use crate::stages::flap::{Flap, FlapPlace};
-use crate::stages::haptic_config::HapticConfig;
-use crate::stages::notice::{Notice, Watch, What};
-use crate::stages::score::ScoreKeeper;
-use crate::stages::tray::Tray;
-use crate::stages::undo::Undo;
+use crate::score::ScoreKeeper;
+use crate::tray::Tray;
+use crate::undo::Undo;
 use std::sync::Arc;
 use trepan_bone::{BoneVolume, FlapSearch};
 use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardedWrench, SurfacePatch};
@@ -89,9 +89,9 @@ impl HapticStage {
 }
 
 /// Age up to which a patch gives its full force, ms.
-pub(crate) const FRESH_MS: f32 = 10.0;
+pub const FRESH_MS: f32 = 10.0;
 /// Age from which a patch gives no force, ms.
-pub(crate) const GONE_MS: f32 = 60.0;
+pub const GONE_MS: f32 = 60.0;
 
 /// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
@@ -256,7 +256,7 @@ impl HapticStage {
     }
 
     /// Where the planned flap is.
-    pub(crate) fn flap_place(&self) -> FlapPlace {
+    pub fn flap_place(&self) -> FlapPlace {
         self.flap.as_ref().map(Flap::place).unwrap_or_default()
     }
 
@@ -286,7 +286,7 @@ impl HapticStage {
     }
 
     /// Returns the newtons at the hand per newton of the task, on bone.
-    pub(crate) fn force_scale(&self) -> ForceScale {
+    pub fn force_scale(&self) -> ForceScale {
         ForceScale(self.config.force_scale)
     }
 

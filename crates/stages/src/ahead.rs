@@ -18,7 +18,7 @@ use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 
 /// Returns the remaining bone along `direction` (unit) from `front`, mm, at most `reach_mm`.
-pub(crate) fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, reach_mm: f32) -> f32 {
+pub fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, reach_mm: f32) -> f32 {
     let step = 0.25 * bone.spacing_mm();
     let over = |mm: f32| density(bone, front + mm * direction) - f32::from(bone.isovalue());
     let (mut left, mut last) = (0.0, over(0.0));
@@ -37,7 +37,7 @@ pub(crate) fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, rea
 }
 
 /// Returns the trilinear density, HU.
-pub(crate) fn density(bone: &BoneVolume, point: Vec3) -> f32 {
+pub fn density(bone: &BoneVolume, point: Vec3) -> f32 {
     let grid = bone.grid_of(point);
     let low = grid.floor();
     let t = grid - low;

@@ -18,7 +18,7 @@ use trepan_measurements::hands;
 
 /// Newtons at the hand per newton of the task, on bone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ForceScale(pub f32);
+pub struct ForceScale(pub f32);
 
 impl Default for ForceScale {
     fn default() -> Self {

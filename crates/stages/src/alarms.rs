@@ -9,9 +9,9 @@
 //! Forces on brain tissue in neurosurgery are mostly under 0.3 N: H. J. Marcus et al., *Forces
 //! exerted during microneurosurgery*, Neurosurgery 2014.
 
-use crate::stages::drill::{BREAK_MM, THIN_MM};
-use crate::stages::notice::Warning;
-use crate::stages::score::cuts_into_brain;
+use crate::drill::{BREAK_MM, THIN_MM};
+use crate::notice::Warning;
+use crate::score::cuts_into_brain;
 use trepan_link::wire::TickRecord;
 use trepan_measurements::{grip, hands};
 
@@ -25,7 +25,7 @@ const MIN_WEIGHT: f32 = 0.4;
 
 /// Smoothed feed rate: decrease of the remaining bone over time.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Feed {
+pub struct Feed {
     last_mm: Option<f32>,
     mm_per_ms: f32,
     /// Weight of the samples in the smoothing so far, 0 to 1.
@@ -51,13 +51,13 @@ impl Feed {
 }
 
 /// Share of real time under which tissue counts as slow.
-pub(crate) const REAL_TIME: f32 = 0.98;
+pub const REAL_TIME: f32 = 0.98;
 /// Time over which the pace of tissue is taken, ms.
 const PACE_MS: f64 = 1000.0;
 
 /// Pace of the simulated tissue.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pace {
+pub struct Pace {
     /// When it was last taken, and the tissue's time then, ms.
     last_ms: Option<(f64, f64)>,
     share: f32,
@@ -84,7 +84,7 @@ impl Pace {
 
 /// Inputs of the warnings that are not in a tick's record.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct WarningInputs {
+pub struct WarningInputs {
     /// Whether the tool cuts bone and has no foot that protects the dura.
     pub bare_cutter: bool,
     /// Remaining bone ahead, mm.

@@ -200,7 +200,6 @@ pub enum Hindrance {
 
 impl Hindrance {
     /// All reasons.
-    #[cfg(test)]
     pub const ALL: [Self; 12] = [
         Self::Tool,
         Self::SecondTool,
@@ -304,7 +303,7 @@ impl Notice {
 
 /// The active warnings, with hysteresis, so that noise at a threshold does not repeat them.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Watch {
+pub struct Watch {
     standing: u32,
     quiet_since_ms: [f64; Warning::ALL.len()],
 }

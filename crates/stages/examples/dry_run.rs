@@ -1,7 +1,7 @@
 //! A craniotomy on a synthetic head without threads, clock or window: the haptic stage alone, at
 //! full speed.
 //!
-//! `cargo run --release -p trepan-simulator --example dry_run`
+//! `cargo run --release -p trepan-stages --example dry_run`
 
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
@@ -9,7 +9,7 @@ use trepan_contact::SurfacePatch;
 use trepan_geometry::Vec3;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Script, Site};
-use trepan_simulator::{HapticConfig, HapticStage, Program, TickInput};
+use trepan_stages::{HapticConfig, HapticStage, Program, TickInput};
 use trepan_volume::{DistanceField, VoxelVolume};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
