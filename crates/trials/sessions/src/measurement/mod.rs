@@ -1,7 +1,7 @@
 //! Published measurements beside what this project computes, and whether it lies inside.
 //!
 //! # Practice
-//! Parts make a [`Comparison`](comparison::Comparison) for each published value and lines of curves
+//! Parts make a `Comparison` for each published value and lines of curves
 //! over data; the judgement makes the table "Against measurement". Values are rows of
 //! `trepan-measurements`, by their names.
 
