@@ -4,7 +4,7 @@
 //! Each constant ranges over its row of the register: between value over factor and value times
 //! factor ([`Row::factor`](trepan_measurements::Row::factor)), uniform in its logarithm. Effects
 //! and shares are those on the logarithm of the output. All constants are screened by elementary
-//! effects ([`morris`]); the variance is shared out among those that rank first ([`sobol`]), the
+//! effects (`morris`); the variance is shared out among those that rank first (`sobol`), the
 //! others stay at the program's values.
 //!
 //! # Practice

@@ -155,7 +155,7 @@ struct Timed {
 }
 
 impl<'a> Calibration<'a> {
-    /// Rounds over [`CALIBRATION`] for [`CALIBRATION_MS`].
+    /// Rounds over `CALIBRATION` for `CALIBRATION_MS`.
     pub fn of(scene: &'a Scene, usual: f64) -> Self {
         let sample = sample(scene);
         let of_sample = Expected::of(&sample, &[], usual).expect("the scene is finite");

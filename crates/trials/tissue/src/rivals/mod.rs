@@ -6,7 +6,7 @@
 //! under a tenth of gravity. The truth is the continuum's rest: quadratic displacements and linear
 //! pressure by scikit-fem on a finer mesh (`fixtures/fem/hang.jsonl`). The error is the root mean
 //! square over three places of the distance from there, as a share of the way. A run is at rest
-//! from the first sample after which all stay within [`STILL_PERCENT`] of the last one, which must
+//! from the first sample after which all stay within `STILL_PERCENT` of the last one, which must
 //! be in the first four fifths of the time.
 //!
 //! # Practice
