@@ -14,8 +14,9 @@
 //!
 //! # Practice
 //! A step never panics, allocates, locks, logs or waits; faults of device, thread or input are
-//! answers, and each is counted. Only a [`GuardedWrench`](trepan_contact::GuardedWrench) leaves a
-//! tick.
+//! answers, and each is counted. One step of a session is the exception: that in which a cheaper
+//! solver takes over allocates, and logs where its body was refused. Only a
+//! [`GuardedWrench`](trepan_contact::GuardedWrench) leaves a tick.
 //!
 //! # When not to use it
 //! For a single method: use the method's crate.
