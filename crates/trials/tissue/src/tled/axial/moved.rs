@@ -13,9 +13,11 @@
 //! # Practice
 //! The hand is the simulated device of a session, with its delay, without Coulomb friction and
 //! encoder steps, which let it rest beside its balance. Its haptic tick, with the force guard, is
-//! that of a session; tissue gives a result every [`RESULT_MS`].
+//! that of a session; one scene has a collision step every 4 ms only.
 
-use super::{BEFORE_MM, Bench, FELT_N, Found, REST_MS, SPEED, Scene, block, edge_mm, judge, sizes, tilt_deg, truths};
+use super::{
+    BEFORE_MM, Bench, FELT_N, Found, REST_MS, SPEED, Scene, block, edge_mm, judge, largest_tilt_deg, sizes, truths,
+};
 use anyhow::Result;
 use trepan_contact::SurfacePatch;
 use trepan_evidence::part::Part;
@@ -29,8 +31,8 @@ use trepan_stages::{HapticConfig, HapticStage, Program, TickInput};
 
 /// Way of a slide before and, where it goes on, behind the middle, mm.
 const SLIDE_MM: f32 = 4.0;
-/// Longest time between two results of the collision with tissue for the hand, ms.
-const RESULT_MS: u64 = 4;
+/// Friction coefficient of the slides to both sides.
+const FRICTION: f32 = 0.1;
 /// Rest of the hand after each move, ms: several of its slowest time constants.
 const HAND_REST_MS: usize = 600;
 /// Time in which the hand waits in air while the force ramps in, ms.
@@ -50,14 +52,16 @@ pub(super) fn parts() -> Vec<Part> {
     let spatula = Scene { tool: Tool::spatula(), ..heavy };
     let pia = heavy.on_pia_arachnoid();
     let smooth = |name, scene: Scene, truth_mm| Scene { name, friction: 0.0, truth_mm, ..scene };
+    let rubbed = |name, scene: Scene| Scene { name, friction: FRICTION, truth_mm: 3, ..scene };
     vec![
         of(smooth("slide of a probe to the middle", heavy, 3), end),
         of(smooth("slide of a spatula to the middle", spatula, 4), end),
         of(smooth("slide of a probe on pia-arachnoid to the middle", pia, 4), end),
-        of(Scene { name: "slides of a probe to both sides", truth_mm: 3, ..heavy }, mirrored),
-        of(Scene { name: "slides of a probe on pia-arachnoid to both sides", truth_mm: 3, ..pia }, mirrored),
+        of(rubbed("slides of a probe to both sides", heavy), mirrored),
+        of(rubbed("slides of a probe on pia-arachnoid to both sides", pia), mirrored),
         of(Scene { name: "hand with a probe", truth_mm: 4, ..heavy }, held),
         of(Scene { name: "hand with a probe on pia-arachnoid", ..pia }, held),
+        of(Scene { name: "hand with a probe, collision every 4 ms", collision_ms: 4, ..heavy }, held),
     ]
 }
 
@@ -173,7 +177,7 @@ fn press_by_hand(scene: &Scene, mesh: &TetMesh, hand: HandModel) -> Result<Vec<F
     let (mut patch, mut forces, mut all) = (SurfacePatch::default(), Vec::new(), Vec::new());
     for tick in 1..=places.len() as u64 {
         let reading = device.read(tick as f64);
-        if tick.is_multiple_of(RESULT_MS) {
+        if tick.is_multiple_of(scene.collision_ms) {
             bench.collide(reading.tool.tip(), reading.tool.twist.linear);
             patch = SurfacePatch { time_ms: tick as f64, ..bench.out.patch };
         }
@@ -186,7 +190,7 @@ fn press_by_hand(scene: &Scene, mesh: &TetMesh, hand: HandModel) -> Result<Vec<F
             let mut found = Found { depth_mm: at as u32 + 1, ..Found::default() };
             found.rest(&forces);
             let felt = forces.iter().filter(|force| force.length() > FELT_N);
-            found.tilt_moving_deg = felt.map(|force| tilt_deg(*force)).fold(0.0, f64::max);
+            found.tilt_moving_deg = Some(largest_tilt_deg(felt));
             bench.tell(mesh, &mut found);
             all.push(found);
         }
