@@ -92,7 +92,18 @@ pub enum BoneError {
 
 impl BoneVolume {
     /// Copies densities; voxels at or over `isovalue`, HU, are bone.
+    ///
+    /// # Errors
+    /// If the grid is not one of cubes along the axes, or holds no bone.
     pub fn new(volume: &VoxelVolume<i16>, isovalue: i16) -> Result<Self, BoneError> {
+        Self::of(volume.clone(), isovalue)
+    }
+
+    /// As [`new`](Self::new), in the memory of the volume: no second copy of a large skull.
+    ///
+    /// # Errors
+    /// If the grid is not one of cubes along the axes, or holds no bone.
+    pub fn of(volume: VoxelVolume<i16>, isovalue: i16) -> Result<Self, BoneError> {
         let spacing = volume.spacing_mm().x;
         let scale = volume.world_from_voxel.matrix3;
         if !scale.abs_diff_eq(glam::DMat3::from_diagonal(DVec3::splat(spacing)), 1e-6 * spacing) {
@@ -107,7 +118,7 @@ impl BoneVolume {
             spacing_mm: spacing as f32,
             isovalue,
             bounds: Aabb::EMPTY,
-            hu: volume.data.par_iter().map(|&v| AtomicI16::new(v)).collect(),
+            hu: volume.data.into_iter().map(AtomicI16::new).collect(),
             cut: cut::CutField::new(volume.dims, spacing as f32, 0),
             bricks,
             versions: counters(),

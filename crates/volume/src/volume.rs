@@ -41,6 +41,37 @@ impl<T: Copy> VoxelVolume<T> {
         voxel.iter().zip(self.dims).all(|(&v, n)| v < n).then(|| self.data[self.index(voxel)])
     }
 
+    /// Lowest and highest voxel of the box around all samples of a kind; `None` if there are none.
+    pub fn box_where(&self, is: impl Fn(&T) -> bool) -> Option<[[usize; 3]; 2]> {
+        let [nx, ny, _] = self.dims;
+        let ends = |(row, samples): (usize, &[T])| {
+            let (y, z) = (row % ny, row / ny);
+            Some([[samples.iter().position(&is)?, y, z], [samples.iter().rposition(&is)?, y, z]])
+        };
+        let join = |[a, b]: [[usize; 3]; 2], [c, d]: [[usize; 3]; 2]| {
+            [core::array::from_fn(|axis| a[axis].min(c[axis])), core::array::from_fn(|axis| b[axis].max(d[axis]))]
+        };
+        self.data.chunks_exact(nx.max(1)).enumerate().filter_map(ends).reduce(join)
+    }
+
+    /// Keeps the voxels of a box only, where they are in the world: `dims` of them from `low` on.
+    /// Needs no further memory and gives back what is not used.
+    ///
+    /// # Panics
+    /// If the box is not inside.
+    pub fn crop(&mut self, low: [usize; 3], dims: [usize; 3]) {
+        assert!((0..3).all(|axis| low[axis] + dims[axis] <= self.dims[axis]), "{low:?} and {dims:?} lie beyond");
+        let [nx, ny, nz] = dims;
+        for row in 0..ny * nz {
+            let from = self.index([low[0], low[1] + row % ny, low[2] + row / ny]);
+            self.data.copy_within(from..from + nx, row * nx);
+        }
+        self.data.truncate(nx * ny * nz);
+        self.data.shrink_to_fit();
+        self.dims = dims;
+        self.world_from_voxel = self.world_from_voxel * DAffine3::from_translation(low.map(|n| n as f64).into());
+    }
+
     /// Maps the samples, on the same grid.
     pub fn map<U>(&self, f: impl Fn(T) -> U) -> VoxelVolume<U> {
         VoxelVolume {
@@ -80,5 +111,26 @@ impl<T: Copy> VoxelVolume<T> {
     pub fn world_box(&self) -> Aabb {
         let (low, high) = self.world_corners();
         Aabb { min: low.as_vec3(), max: high.as_vec3() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_cropped_stays_where_it_is() {
+        let mut volume = VoxelVolume::isotropic([5, 4, 3], Vec3::new(1.0, 2.0, 3.0), 0.5, 0u16);
+        volume.data.iter_mut().zip(0..).for_each(|(sample, at)| *sample = at);
+        let whole = volume.clone();
+        let [low, high] = whole.box_where(|sample| [27, 33, 52].contains(sample)).unwrap();
+        assert_eq!((low, high), ([2, 1, 1], [3, 2, 2]));
+        volume.crop(low, [2, 2, 2]);
+        for (at, sample) in volume.data.iter().enumerate() {
+            let voxel = [at % 2, at / 2 % 2, at / 4];
+            let before = [0, 1, 2].map(|axis| voxel[axis] + low[axis]);
+            assert_eq!((Some(*sample), volume.centre_of(voxel)), (whole.get(before), whole.centre_of(before)));
+        }
+        assert!(volume.box_where(|sample| *sample > 60).is_none());
     }
 }

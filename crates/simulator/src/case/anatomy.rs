@@ -5,7 +5,7 @@ use crate::error::SessionError;
 use crate::mixture;
 use crate::recipe::Recipe;
 use crate::remark::WELL;
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use std::path::Path;
 use trepan_mesh::lattice::{self, Fine};
 use trepan_volume::{
@@ -238,14 +238,15 @@ pub(super) fn find_brain(
     Ok(mask)
 }
 
-/// Resamples a CT to cubic voxels, by a spline whose isosurface has no creases, and keeps the
-/// largest piece of bone. Also returns what was loose.
+/// Resamples a CT around its bone to cubic voxels, by a spline whose isosurface has no creases, and
+/// keeps the largest piece of bone. Also returns what was loose.
 pub(super) fn make_skull(
     ct: &VoxelVolume<i16>,
     recipe: &Recipe,
     isovalue_hu: i16,
 ) -> Result<(VoxelVolume<i16>, Islands), SessionError> {
-    let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
+    let is_bone = |hu: &i16| *hu >= isovalue_hu;
+    let grid = around_bone(ct, recipe.spacing_mm, ct.box_where(is_bone));
     room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
         let text =
             format!("the skull at --spacing-mm {}: {fault}; give a larger spacing or crop the CT", recipe.spacing_mm);
@@ -254,12 +255,42 @@ pub(super) fn make_skull(
     let mut skull = resample(ct, &grid, Interpolation::Cubic, AIR_HU);
     let islands = skull_only(&mut skull, isovalue_hu);
     // Beside a step the spline reaches above the CT: what is bone, the CT itself says.
-    if ![ct, &skull].into_iter().all(|volume| volume.data.iter().any(|&hu| hu >= isovalue_hu)) {
+    let bone = skull.box_where(is_bone).filter(|_| ct.data.iter().any(is_bone));
+    let Some(bone) = bone else {
         return Err(SessionError::Case(format!(
             "no voxel of the CT reaches {isovalue_hu} HU: there is no bone; give --isovalue-hu"
         )));
-    }
+    };
+    let [low, dims] = with_room(bone, skull.dims);
+    skull.crop(low, dims);
     Ok((skull, islands))
+}
+
+/// Voxels that stay around bone; the grid is cut at multiples of this.
+const ROOM: usize = 8;
+
+/// Lowest voxel and size of a box with room around it, within a grid of these dimensions.
+fn with_room([low, high]: [[usize; 3]; 2], dims: [usize; 3]) -> [[usize; 3]; 2] {
+    let first = low.map(|low| low.saturating_sub(ROOM) / ROOM * ROOM);
+    [first, [0, 1, 2].map(|axis| ((high[axis] + 1).div_ceil(ROOM) * ROOM + ROOM).min(dims[axis]) - first[axis])]
+}
+
+/// The part around bone, in a box of the CT's voxels, of the cubes that cover the CT.
+fn around_bone(ct: &VoxelVolume<i16>, spacing_mm: f32, bone: Option<[[usize; 3]; 2]>) -> Grid {
+    let whole = Grid::isotropic_over(ct, spacing_mm);
+    let Some(bone) = bone else { return whole };
+    let inverse = whole.world_from_voxel.inverse();
+    // Between voxels a spline's bone reaches no further than the next one.
+    let [low, high] = [bone[0].map(|low| low as f64 - 1.0), bone[1].map(|high| high as f64 + 1.0)];
+    let corners = (0..8usize).map(|bits| {
+        let at = |axis: usize| if bits >> axis & 1 == 0 { low[axis] } else { high[axis] };
+        inverse.transform_point3(ct.world_from_voxel.transform_point3([at(0), at(1), at(2)].into()))
+    });
+    let (low, high) = corners.fold((DVec3::MAX, DVec3::MIN), |(low, high), at| (low.min(at), high.max(at)));
+    let voxels = |place: DVec3| [0, 1, 2].map(|axis| (place[axis].max(0.0) as usize).min(whole.dims[axis] - 1));
+    let [first, dims] = with_room([voxels(low), voxels(high.ceil())], whole.dims);
+    let world_from_voxel = whole.world_from_voxel * DAffine3::from_translation(first.map(|n| n as f64).into());
+    Grid { dims, world_from_voxel }
 }
 
 /// Builds the tissue classes on a grid around the brain.
@@ -304,13 +335,7 @@ pub(super) fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, Session
         SessionError::Case(format!("the brain mask on {spacing} mm cubes: {fault}; crop the MRI or the labels"))
     })?;
     let whole = resample(mask, &grid, Interpolation::Nearest, 0);
-    let [nx, ny, _] = whole.dims;
-    let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
-    for (at, _) in whole.data.iter().enumerate().filter(|(_, v)| **v != 0) {
-        for (axis, v) in [at % nx, at / nx % ny, at / (nx * ny)].into_iter().enumerate() {
-            (low[axis], high[axis]) = (low[axis].min(v), high[axis].max(v));
-        }
-    }
+    let [low, high] = whole.box_where(|v| *v != 0).unwrap_or_default();
     let margin = (MARGIN_MM / spacing).ceil() as i64;
     let dims = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) + 2 * margin as usize);
     let offset = [0, 1, 2].map(|axis| (low[axis] as i64 - margin) as f64);

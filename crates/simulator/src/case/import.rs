@@ -187,7 +187,7 @@ pub(super) fn errors_in(
         return Ok(errors);
     }
     let of_bone = |ct: &VoxelVolume<i16>| {
-        let bone = Arc::new(bone_of(ct, case.isovalue_hu)?);
+        let bone = Arc::new(bone_of(ct.clone(), case.isovalue_hu)?);
         Ok::<_, SessionError>((Skull { ct: ct.clone(), isovalue: case.isovalue_hu }, bone))
     };
     let skull = case.skull.as_ref().map(of_bone).transpose()?;
@@ -213,7 +213,7 @@ fn sight(
     let inside = classes.as_ref().map(Inside::of);
     let of_bone = |ct: &VoxelVolume<i16>| {
         let (drawn, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
-        let bone = bone_of(&drawn, images.isovalue_hu)?;
+        let bone = bone_of(drawn, images.isovalue_hu)?;
         let opening = Opening::of_patient(&bone, inside.as_ref(), recipe.opening)?;
         let mut skull = Skull { ct: ct.clone(), isovalue: images.isovalue_hu };
         skull_only(&mut skull.ct, skull.isovalue);
@@ -386,8 +386,8 @@ fn build(
     notes.append(&mut of_classes);
     let skull = made.map(|(skull, _)| skull);
     stages.next("planning the opening")?;
-    let on_skull = |(ct, skull)| match known {
-        Some(opening) => opening.on(&bone_of(skull, isovalue_hu)?, classes.is_some()),
+    let on_skull = |(ct, skull): (_, &VoxelVolume<i16>)| match known {
+        Some(opening) => opening.on(&bone_of(skull.clone(), isovalue_hu)?, classes.is_some()),
         None => Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe),
     };
     let opening = match ct.as_ref().zip(skull.as_ref()).map(on_skull).transpose() {

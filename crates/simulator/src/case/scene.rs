@@ -64,7 +64,7 @@ impl Scene {
     /// Prepares a case for a program.
     pub fn new(program: Program, case: Case) -> Result<Self, SessionError> {
         let mut remarks = case.notes;
-        let bone = || case.skull.as_ref().map(|skull| bone_of(skull, case.isovalue_hu)).transpose();
+        let bone = || case.skull.map(|skull| bone_of(skull, case.isovalue_hu)).transpose();
         let field = || case.brain.as_ref().map(|brain| DistanceField::of_mask(&brain.classes));
         let (bone, field) = rayon::join(bone, field);
         let bone = bone?.map(Arc::new);

@@ -47,8 +47,8 @@ pub struct Opening {
 }
 
 /// Bone volume of a skull, for drilling.
-pub(crate) fn bone_of(skull: &VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
-    BoneVolume::new(skull, isovalue_hu).map_err(|fault| SessionError::Case(format!("the CT: {fault}")))
+pub(crate) fn bone_of(skull: VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
+    BoneVolume::of(skull, isovalue_hu).map_err(|fault| SessionError::Case(format!("the CT: {fault}")))
 }
 
 /// Depth below the bone's surface at which a point still counts as on it, mm: two voxels.
@@ -99,9 +99,9 @@ impl Opening {
     ) -> Result<Self, SessionError> {
         let reference = || {
             let (reference, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
-            bone_of(&reference, isovalue_hu)
+            bone_of(reference, isovalue_hu)
         };
-        let here = || (brain.map(Inside::of), bone_of(skull, isovalue_hu));
+        let here = || (brain.map(Inside::of), bone_of(skull.clone(), isovalue_hu));
         let (reference, (inside, skull)) = rayon::join(reference, here);
         let opening = Self::of_patient(&reference?, inside.as_ref(), recipe.opening)?;
         opening.on(&skull?, brain.is_some())
