@@ -2,10 +2,10 @@
 //! presses into the brain and slides.
 //!
 //! # Theory
-//! The tool's tip is a ball that enters the mask's surface by the depth of the scene, at most up to
-//! its equator. On every mesh a spring presses each triangle under the ball to the ball's surface
-//! there. (A single spring on the mean of all triangles sinks deeper on finer meshes; a flat tip
-//! shears the tissue at its rim without bound.)
+//! The tool's tip is a ball that enters the mask's surface by the depth of the scene. It presses the
+//! tissue by the contact law of a session, so that its force holds what contact and mesh do to each
+//! other. (Springs along one normal press fixed places of the surface together until it creases,
+//! and no finer mesh settles; a flat tip shears the tissue at its rim without bound.)
 //!
 //! The ground truth is TLED with averaged nodal pressure and no sleeping elements, on a mesh with a
 //! sixteenth of the edge length under the ball. The error is the distance from its surface within
@@ -23,10 +23,10 @@ use crate::ingredients::{DYNAMIC_MASS_SCALING, Element};
 use crate::run::clock::Clock;
 use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::TriMesh;
-use std::collections::BTreeMap;
 use trepan_budget::{Scene, Tissue, TissueForce, dt_ms};
-use trepan_contact::{NodalContact, NodalContacts};
-use trepan_geometry::{Vec3, quantile};
+use trepan_contact::NodalContacts;
+use trepan_deformable::{Config as Touch, TissueCollision, TissueStep};
+use trepan_geometry::{Pose, Tool, ToolState, Twist, Vec3, quantile};
 use trepan_mesh::{Surface, TetMesh, lattice};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver};
 use trepan_tled::{Config, Damping, Tled};
@@ -87,17 +87,10 @@ const TRUTH_MM: [f32; 2] = [8.0, 5.0];
 /// Largest mass that mass scaling adds, as a share of the brain's mass; the weight is unchanged. It
 /// is added to the elements with the shortest stable time steps: slivers and refined ones.
 pub const MASS_ADDED: f32 = 0.01;
-/// Sample points of the ball's surface, each on the triangle under it; denser than the nodes of a
-/// ground truth.
-const PLACES: u32 = 199;
-/// Share of the ball's radius that the sample points cover, seen from above.
-const WIDTH: f32 = 0.98;
-/// Total stiffness of the springs, N/mm, over ten times the tissue's; and damping, N ms/mm.
-const SPRINGS: (f32, f32) = (0.5, 0.05);
 /// Durations of push, rest and slide, ms.
 const TIMES_MS: [f32; 3] = [120.0, 40.0, 120.0];
 /// Time between updates of the tool, ms.
-const TURN_MS: f32 = 8.0;
+const TURN_MS: f32 = 1.0;
 /// Longest time step, ms: of explicit solvers, of the implicit solver.
 const LONGEST_MS: [f32; 2] = [1.0, 4.0];
 /// Radius around the tool within which the surface is compared, mm, as wide as a burr hole; and
@@ -376,17 +369,17 @@ fn run(
     solver: &mut dyn SoftSolver,
     longest_ms: f32,
 ) -> Result<Pushed, SessionError> {
-    let rest = Surroundings::of(mesh, ends[0])?;
     let ball = Ball { slide, normal, ends };
+    let mut contact = BallContact::new(mesh, ball.at(0.0).radius_mm)?;
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
-    let (mut surfaces, mut forces_n) = (vec![rest], [0.0; 2]);
+    let (mut surfaces, mut forces_n) = (vec![Surroundings::of(mesh, ends[0])?], [0.0; 2]);
     let (mut substeps, mut steps, mut step_ms) = (0, 0u32, 0.0);
     let stops = [TIMES_MS[0] + TIMES_MS[1], TIMES_MS.iter().sum()];
     let (mut now, mut next) = (0.0f32, 0.0f32);
     for (stop, force_n) in stops.into_iter().zip(&mut forces_n) {
         while now < stop {
             if now >= next {
-                ball.press(&surfaces[0], now, &mut loads.contacts);
+                *force_n = contact.press(&ball.at(now), TURN_MS, solver, &mut loads.contacts);
                 next += TURN_MS;
             }
             let clock = Clock::start();
@@ -395,9 +388,7 @@ fn run(
             step_ms += clock.now_ms();
             (steps, now) = (steps + 1, now + dt_ms);
         }
-        let positions = solver.positions();
-        *force_n = PressedBall::force_n(&loads.contacts, positions);
-        surfaces.push(surfaces[0].moved(positions)?);
+        surfaces.push(surfaces[0].moved(solver.positions())?);
     }
     let ns = step_ms * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
     let surfaces = surfaces.try_into().unwrap_or_else(|_| unreachable!("at rest and at two ends"));
@@ -418,22 +409,20 @@ struct Ball<'a> {
 }
 
 impl Ball<'_> {
-    /// Contacts at a time.
-    fn press(&self, rest: &Surroundings, now_ms: f32, out: &mut NodalContacts) {
+    /// The ball at a time.
+    fn at(&self, now_ms: f32) -> PressedBall {
         let (scene, way) = (&self.slide.scene, (now_ms - TIMES_MS[0] - TIMES_MS[1]) / TIMES_MS[2]);
         let in_share = (now_ms / TIMES_MS[0]).min(1.0);
-        let ball = PressedBall {
+        PressedBall {
             middle: self.ends[0].lerp(self.ends[1], way.clamp(0.0, 1.0)),
             normal: self.normal,
             radius_mm: scene.probe_radius_mm as f32,
             depth_mm: scene.tissue_motion_mm as f32 * in_share * in_share * (3.0 - 2.0 * in_share),
-        };
-        ball.press(rest, out);
+        }
     }
 }
 
-/// A ball in the tissue, without friction: every place of the surface under it is pressed along one
-/// normal.
+/// A ball in the tissue, without friction.
 #[derive(Clone, Copy, Debug)]
 pub struct PressedBall {
     /// Place of the surface at rest under the ball's middle.
@@ -447,45 +436,40 @@ pub struct PressedBall {
 }
 
 impl PressedBall {
-    /// Stiffness of the contact at one place, N/mm.
-    pub const STIFFNESS: f32 = SPRINGS.0 / PLACES as f32;
+    /// The ball's middle, mm.
+    pub fn centre(&self) -> Vec3 {
+        self.middle + (self.radius_mm - self.depth_mm) * self.normal
+    }
+}
 
-    /// Offsets of the places from the middle, perpendicular to the normal.
-    pub fn asides(&self) -> impl Iterator<Item = Vec3> {
-        disc(WIDTH * self.radius_mm, PLACES, self.normal)
+/// A session's contact between a ball and one mesh.
+pub struct BallContact {
+    collision: TissueCollision,
+    out: TissueStep,
+    before: Option<Vec3>,
+}
+
+impl BallContact {
+    /// Prepares a ball of a radius, mm.
+    ///
+    /// # Errors
+    /// If the mesh has no surface.
+    pub fn new(mesh: &TetMesh, radius_mm: f32) -> Result<Self, SessionError> {
+        let collision = TissueCollision::new(mesh, &Tool::probe(radius_mm), &Touch::default()).map_err(brain_error)?;
+        Ok(Self { collision, out: TissueStep::default(), before: None })
     }
 
-    /// Height of the ball's surface at an offset, along the normal, mm.
-    pub fn height_mm(&self, aside: Vec3) -> f32 {
-        let Self { middle, normal, radius_mm, depth_mm } = self;
-        middle.dot(*normal) - depth_mm + radius_mm - (radius_mm * radius_mm - aside.length_squared()).sqrt()
-    }
-
-    /// Replaces contacts by a spring on each triangle under the ball, to the ball's surface there.
-    pub fn press(&self, rest: &Surroundings, out: &mut NodalContacts) {
-        // Per triangle: the spring, the sum of the ball's heights, and their number.
-        let mut pressed: BTreeMap<usize, (NodalContact, f32, f32)> = BTreeMap::new();
-        for aside in self.asides() {
-            let (triangle, nodes) = rest.under(self.middle + aside);
-            let (spring, height, places) = pressed.entry(triangle).or_default();
-            nodes.into_iter().for_each(|(node, weight)| spring.add(node, weight));
-            *height += self.height_mm(aside);
-            *places += 1.0;
-        }
+    /// Replaces contacts by those of a ball on its way since the last call, ms ago; returns the
+    /// force on it, N.
+    pub fn press(&mut self, ball: &PressedBall, ms: f32, solver: &dyn SoftSolver, out: &mut NodalContacts) -> f64 {
+        let centre = ball.centre();
+        let linear = (centre - self.before.replace(centre).unwrap_or(centre)) / ms;
+        let twist = Twist { linear, angular: Vec3::ZERO };
+        let state = ToolState { twist, ..ToolState::at(Pose::from_translation(centre)) };
+        self.collision.step(solver.positions(), solver.velocities(), &state, &mut self.out);
         out.clear();
-        for (mut spring, height, places) in pressed.into_values() {
-            spring.normalise();
-            let share = places / PLACES as f32;
-            (spring.normal, spring.offset_mm) = (self.normal, -height / places);
-            (spring.stiffness, spring.damping) = (share * SPRINGS.0, share * SPRINGS.1);
-            out.push(spring);
-        }
-    }
-
-    /// Force of the contacts on tissue at these node positions, N.
-    pub fn force_n(contacts: &NodalContacts, positions: &[Vec3]) -> f64 {
-        let held = |spring: &NodalContact| spring.mean(|n| positions[n as usize]);
-        contacts.all().map(|spring| f64::from(spring.pressure_n(held(&spring), Vec3::ZERO))).sum()
+        self.out.springs(out);
+        self.out.patch.force_n.into()
     }
 }
 

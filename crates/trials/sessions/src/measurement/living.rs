@@ -13,14 +13,14 @@ use trepan_evidence::part::{Part, Scope};
 use trepan_evidence::picture::Series;
 use trepan_evidence::suite::Findings;
 use trepan_measurements::living;
-use trepan_simulator::measure::tissue::{MASS_ADDED, PressedBall};
+use trepan_simulator::measure::tissue::{BallContact, MASS_ADDED, PressedBall};
 use trepan_simulator::{Ingredients, TissueClass};
 use trepan_soft::{Loads, SoftSolver};
 use trepan_tled::{Config, Tled};
 use trepan_trials_tissue::tled::outside::{Pressed, Shape, Size};
 
 /// Time between updates of the ball, ms.
-const TURN_MS: f32 = 8.0;
+const TURN_MS: f32 = 1.0;
 /// Young's modulus of the brain, MPa: the programs' default.
 const YOUNG_MPA: f32 = 0.003;
 /// Mesh of the preset `usual`.
@@ -80,18 +80,19 @@ fn press(pressed: &Pressed, with: &Ingredients) -> Result<Vec<(f64, f64)>> {
     let mut solver = Tled::new(&pressed.body, &config)?;
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
     let (speed_mm_per_ms, end_mm) = (1e-3 * living::PALPATION_SPEED.f32(), living::PALPATION_DEPTH.f32());
+    let mut contact = BallContact::new(&pressed.body.mesh, living::PALPATION_RADIUS.f32())?;
     let (mut now_ms, mut depth_mm, mut curve) = (0.0f32, 0.0f32, Vec::new());
     while depth_mm < end_mm {
         depth_mm = (depth_mm + speed_mm_per_ms * TURN_MS).min(end_mm);
         let ball = PressedBall { radius_mm: living::PALPATION_RADIUS.f32(), depth_mm, ..pressed.ball };
-        ball.press(&pressed.surface, &mut loads.contacts);
+        let force_n = contact.press(&ball, TURN_MS, &solver, &mut loads.contacts);
+        curve.push((depth_mm.into(), force_n));
         let next_ms = now_ms + TURN_MS;
         while now_ms < next_ms {
             let dt_ms = solver.next_dt_ms().min(1.0);
             solver.step(&loads, dt_ms);
             now_ms += dt_ms;
         }
-        curve.push((depth_mm.into(), PressedBall::force_n(&loads.contacts, solver.positions())));
     }
     Ok(curve)
 }

@@ -145,7 +145,7 @@ impl Pressed {
         };
         let mut solver = Tled::new(&body, &config)?;
         let ball = PressedBall { middle, normal: self.normal, radius_mm, depth_mm };
-        let (force_n, at_rest) = press_to_rest(&mut solver, &ball, &surface, TIMES_MS);
+        let (force_n, at_rest) = press_to_rest(&mut solver, &ball, &body.mesh, TIMES_MS)?;
         let at = |n: u32| solver.positions()[n as usize] - body.mesh.positions[n as usize];
         let moved = disc(LOOKS.1, LOOKS.0, self.normal).map(|aside| {
             let (_, nodes) = surface.under(middle + aside);

@@ -2,9 +2,9 @@
 //! built-in brain, and slid.
 //!
 //! # Theory
-//! The body is fixed below and free above. The ball presses places of the surface along one normal
-//! by springs ([`PressedBall`]), without friction, so that the state at rest does not depend on the
-//! way there: the end of a slide is a press at its end. The truth is `fixtures/fem/press.jsonl` by
+//! The body is fixed below and free above. The ball presses the surface without friction, by the
+//! contact law of a session ([`BallContact`]), so that the state at rest does not depend on the way
+//! there: the end of a slide is a press at its end. The truth is `fixtures/fem/press.jsonl` by
 //! `press.py`: quadratic displacements and linear pressure, Newton's method, f64, on its own mesh.
 //! Displacements are compared at 60 places of the surface within 15 mm of the ball, as the root
 //! mean square of the distance over that of the truth. The distance between two meshes of the
@@ -15,9 +15,8 @@
 //! the tissue without bound: no elastic model has an answer there, and none is asked for. The same
 //! holds for stress at the edge of a clamp, where every mesh gives another value; only force and
 //! displacement are judged. The meshes of TLED fill the body's mask, each in its own way, so that
-//! the error holds what their shape lacks, too. Under the ball the surface is pressed together
-//! until it may crease, and no spring holds it sideways: `fixtures/fem/README.md` tells how far
-//! apart two meshes of the truth are along the normal and sideways.
+//! the error holds what their shape lacks, too. `fixtures/fem/README.md` tells how far apart two
+//! meshes of the truth are along the normal and sideways.
 
 use super::Scope;
 use anyhow::{Context, Result};
@@ -27,7 +26,9 @@ use trepan_evidence::part::Part;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_mesh::{TetMesh, lattice};
-use trepan_simulator::measure::tissue::{Fineness, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes};
+use trepan_simulator::measure::tissue::{
+    BallContact, Fineness, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes,
+};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 use trepan_volume::{DistanceField, Grid, Interpolation, VoxelVolume, largest_component, read, resample};
@@ -302,24 +303,29 @@ fn row(scene: &str, method: &str, tets: usize, [displacement, force]: [f64; 2], 
 pub(super) fn press_to_rest(
     solver: &mut Tled,
     ball: &PressedBall,
-    surface: &Surroundings,
+    mesh: &TetMesh,
     times_ms: [f32; 2],
-) -> (f64, bool) {
+) -> Result<(f64, bool)> {
+    let mut contact = BallContact::new(mesh, ball.radius_mm)?;
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
-    let (mut now, mut next, mut force_n, mut before) = (0.0f32, 0.0f32, 0.0f64, f64::INFINITY);
-    while now < times_ms[1] && (now < 2.0 * times_ms[0] || (force_n / before - 1.0).abs() > STILL) {
-        let share = (now / times_ms[0]).min(1.0);
-        PressedBall { depth_mm: share * ball.depth_mm, ..*ball }.press(surface, &mut loads.contacts);
-        next += if share < 1.0 { 4.0 } else { 50.0 };
-        while now < next {
+    let (mut now, mut force_n, mut before, mut is_still) = (0.0f32, 0.0f64, f64::INFINITY, false);
+    for ms in 1.. {
+        let pressed = PressedBall { depth_mm: (now / times_ms[0]).min(1.0) * ball.depth_mm, ..*ball };
+        force_n = contact.press(&pressed, 1.0, solver, &mut loads.contacts);
+        if now > 2.0 * times_ms[0] && ms % 50 == 0 {
+            is_still = (force_n / before - 1.0).abs() <= STILL;
+            before = force_n;
+        }
+        if is_still || now >= times_ms[1] {
+            break;
+        }
+        while now < ms as f32 {
             let dt_ms = solver.next_dt_ms().min(1.0);
             solver.step(&loads, dt_ms);
             now += dt_ms;
         }
-        before = force_n;
-        force_n = PressedBall::force_n(&loads.contacts, solver.positions());
     }
-    (force_n, (force_n / before - 1.0).abs() <= STILL)
+    Ok((force_n, is_still))
 }
 
 /// Presses by TLED as a session steps it, until rest; force, N, and errors of displacement and
@@ -328,7 +334,7 @@ fn step(pressed: &Pressed, averaged_pressure: bool, truth: &Solution) -> Result<
     let Pressed { body, surface, ball, .. } = pressed;
     let config = Config { mass_scaling: MASS_ADDED, averaged_pressure, ..Config::default() };
     let mut solver = Tled::new(body, &config)?;
-    let (force_n, _) = press_to_rest(&mut solver, ball, surface, TIMES_MS);
+    let (force_n, _) = press_to_rest(&mut solver, ball, &body.mesh, TIMES_MS)?;
     let moved = truth.places_mm.iter().map(|&place| {
         let (_, nodes) = surface.under(Vec3::from_array(place));
         nodes.into_iter().map(|(n, w)| w * (solver.positions()[n as usize] - body.mesh.positions[n as usize])).sum()
@@ -381,19 +387,11 @@ impl Pressed {
         let on_triangle = |place: Vec3| surface.under(place).1;
         let place =
             |nodes: [(u32, f32); 3]| serde_json::json!({ "nodes": nodes.map(|n| n.0), "weights": nodes.map(|n| n.1) });
-        let contacts: Vec<_> = ball
-            .asides()
-            .map(|aside| {
-                let mut contact = place(on_triangle(ball.middle + aside));
-                contact["height_mm"] = ball.height_mm(aside).into();
-                contact
-            })
-            .collect();
         let (material, mesh) = (body.material(0), &body.mesh);
         serde_json::json!({
             "scene": scene, "positions_mm": mesh.positions.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
             "tets": mesh.tets, "fixed": body.fixed, "normal": ball.normal.to_array(), "depth_mm": ball.depth_mm,
-            "stiffness_n_per_mm": PressedBall::STIFFNESS, "contacts": contacts,
+            "radius_mm": ball.radius_mm, "centre_mm": ball.centre().to_array(),
             "looks": self.looks().map(|look| place(on_triangle(look))).collect::<Vec<_>>(),
             "young_mpa": material.young_mpa(), "poisson": material.poisson(),
         })
