@@ -2,10 +2,10 @@
 //! presses into the brain and slides.
 //!
 //! # Theory
-//! The tool's tip is a ball that enters the mask's surface by the depth of the scene. It presses the
-//! tissue by the contact law of a session, so that its force holds what contact and mesh do to each
-//! other. (Springs along one normal press fixed places of the surface together until it creases,
-//! and no finer mesh settles; a flat tip shears the tissue at its rim without bound.)
+//! The tool's tip is a ball that enters the mask's surface by the depth of the scene. It presses
+//! the tissue by the contact law of a session, so that its force holds what contact and mesh do to
+//! each other. (Springs along one normal press fixed places of the surface together until it
+//! creases, and no finer mesh settles; a flat tip shears the tissue at its rim without bound.)
 //!
 //! The ground truth is TLED with averaged nodal pressure and no sleeping elements, on a mesh with a
 //! sixteenth of the edge length under the ball. The error is the distance from its surface within

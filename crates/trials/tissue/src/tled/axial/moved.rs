@@ -1,12 +1,12 @@
 //! Slides over the block, and a hand that gives way.
 //!
 //! # Theory
-//! - Without friction an elastic body at rest does not know how the tool came: a slide that ends over
-//!   the middle of the block must feel what an upright press feels there (`axial.csv`).
+//! - Without friction an elastic body at rest does not know how the tool came: a slide that ends
+//!   over the middle of the block must feel what an upright press feels there (`axial.csv`).
 //! - With friction and in motion, slides to both sides are each other's mirror images: over the
-//!   middle their forces must be, too, whatever tissue and friction do. Half of their distance is
-//!   error; the drag and the contact's friction coefficient bound each other only loosely, since
-//!   the tissue before the tool also holds it back, and the drag is charted.
+//!   middle their forces must be, too, whatever tissue and friction do. The drag over the normal
+//!   force is charted; it must be more than the coefficient of friction, since the tissue before
+//!   the tool also holds it back.
 //! - A hand of stiffness k that wants to be D deep comes to rest at the depth d where the truth's
 //!   force F(d) is k (D - d). F is interpolated between whole millimetres as a power.
 //!
