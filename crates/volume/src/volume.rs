@@ -69,7 +69,7 @@ impl<T: Copy> VoxelVolume<T> {
         self.data.truncate(nx * ny * nz);
         self.data.shrink_to_fit();
         self.dims = dims;
-        self.world_from_voxel = self.world_from_voxel * DAffine3::from_translation(low.map(|n| n as f64).into());
+        self.world_from_voxel *= DAffine3::from_translation(low.map(|n| n as f64).into());
     }
 
     /// Maps the samples, on the same grid.
