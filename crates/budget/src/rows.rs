@@ -230,11 +230,11 @@ mod tests {
 
     #[test]
     fn a_bad_table_is_refused_by_line() {
-        let told = |table| read::<Picture>(table).unwrap_err().to_string();
-        assert!(told("a,b\n").contains("picture.csv, line 1: expected the columns rays,detail"));
+        let fault = |table| read::<Picture>(table).unwrap_err().to_string();
+        assert!(fault("a,b\n").contains("picture.csv, line 1: expected the columns rays,detail"));
         let table = |line: &str| &*Box::leak(format!("{}\n{line}\n", header::<Picture>()).into_boxed_str());
-        assert!(told(table("every,1")).contains("line 2: 2 fields, expected 14"));
-        assert!(told(table("few,1,0,0,0,0,0,0,0,0,0,0,0,0")).contains("no choice: few,1"));
-        assert!(told(table("every,1,0,x,0,0,0,0,0,0,0,0,0,0")).contains("not 6 numbers"));
+        assert!(fault(table("every,1")).contains("line 2: 2 fields, expected 14"));
+        assert!(fault(table("few,1,0,0,0,0,0,0,0,0,0,0,0,0")).contains("no choice: few,1"));
+        assert!(fault(table("every,1,0,x,0,0,0,0,0,0,0,0,0,0")).contains("not 6 numbers"));
     }
 }

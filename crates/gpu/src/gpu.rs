@@ -186,21 +186,21 @@ impl Gpu {
         take: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, GpuError> {
         let slice = staging.slice(..bytes);
-        let (tell, told) = std::sync::mpsc::channel();
+        let (sender, receiver) = std::sync::mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |mapped| {
             // The receiver is dropped only if this call has timed out.
-            tell.send(mapped).ok();
+            sender.send(mapped).ok();
         });
         // The system wakes a sleeper later than a short piece of work is done.
         let begun = Instant::now();
-        let mut answer = told.try_recv();
+        let mut answer = receiver.try_recv();
         while answer.is_err() && !self.is_software() && begun.elapsed() < AWAKE {
             self.inner.device.poll(wgpu::PollType::Poll).ok();
-            answer = told.try_recv();
+            answer = receiver.try_recv();
         }
         if answer.is_err() {
             self.wait()?;
-            answer = told.try_recv();
+            answer = receiver.try_recv();
         }
         let lost = |e: String| GpuError::Lost(e);
         answer.map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;

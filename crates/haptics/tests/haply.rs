@@ -29,11 +29,11 @@ fn run_until(
         }
         std::thread::sleep(Duration::from_micros(500));
     }
-    panic!("it never happened: {:?}, {:?}", device.watch().fault(), service.told());
+    panic!("it never happened: {:?}, {:?}", device.watch().fault(), service.received());
 }
 
 fn told_force(service: &Service) -> Vec3 {
-    Vec3::from(service.told().force.unwrap_or_default().map(|f| f as f32))
+    Vec3::from(service.received().force.unwrap_or_default().map(|f| f as f32))
 }
 
 fn error(behaviour: Behaviour) -> String {
@@ -47,7 +47,8 @@ fn pose_velocity_buttons_and_force_have_the_right_axes_and_units() {
     let mut device = open(&service).unwrap();
     let force = Vec3::new(0.1, 0.2, 0.3);
     // Service: x right, y forward, z up. Driver: x right, y up, z to the user.
-    let reading = run_until(&mut device, &service, force, |_, told| (told - Vec3::new(0.1, -0.3, 0.2)).length() < 1e-6);
+    let reading =
+        run_until(&mut device, &service, force, |_, received| (received - Vec3::new(0.1, -0.3, 0.2)).length() < 1e-6);
     assert!((reading.tool.tip() - Vec3::new(10.0, 30.0, -20.0)).length() < 1e-4, "{}", reading.tool.tip());
     assert!((reading.tool.twist.linear - Vec3::new(0.1, 0.3, -0.2)).length() < 1e-6);
     assert_eq!(reading.tool.buttons, Buttons::PEDAL);
@@ -55,9 +56,9 @@ fn pose_velocity_buttons_and_force_have_the_right_axes_and_units() {
     let (axis, angle) = reading.tool.world_from_tool.rotation.to_axis_angle();
     assert!((axis - Vec3::Y).length() < 1e-4 && (angle - 2.0 * 0.6f32.asin()).abs() < 1e-4, "{axis} {angle}");
     device.close();
-    let told = service.told();
-    assert_eq!((told.profile.as_deref(), told.probes, told.misuse), (Some("trepan"), 1, 0));
-    assert_eq!(told.force, Some([0.0; 3]), "closing leaves no force");
+    let received = service.received();
+    assert_eq!((received.profile.as_deref(), received.probes, received.misuse), (Some("trepan"), 1, 0));
+    assert_eq!(received.force, Some([0.0; 3]), "closing leaves no force");
 }
 
 #[test]
@@ -80,8 +81,8 @@ fn services_that_cannot_serve_say_what_to_do() {
 fn fragments_pings_and_split_packets_are_put_together() {
     let service = Service::start(Behaviour { fragmented: true, ..Behaviour::default() });
     let mut device = open(&service).unwrap();
-    run_until(&mut device, &service, Vec3::X * 0.5, |_, told| told.x > 0.49);
-    assert!(service.told().pongs > 10);
+    run_until(&mut device, &service, Vec3::X * 0.5, |_, received| received.x > 0.49);
+    assert!(service.received().pongs > 10);
 }
 
 #[test]
@@ -95,9 +96,9 @@ fn every_state_that_forbids_force_cuts_it_and_says_why() {
         (r#"{"calibrated":true,"power_supply":true,"ready":false}"#, Fault::Braked),
     ] {
         service.behave(|b| b.status = service::READY.to_owned());
-        run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+        run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
         service.behave(|b| b.status = status.to_owned());
-        run_until(&mut device, &service, Vec3::X, |_, told| told == Vec3::ZERO && watch.fault() == Some(fault));
+        run_until(&mut device, &service, Vec3::X, |_, received| received == Vec3::ZERO && watch.fault() == Some(fault));
     }
 }
 
@@ -107,12 +108,12 @@ fn invalid_and_late_replies_cut_the_force_until_they_end() {
     let mut device = open(&service).unwrap();
     let watch = device.watch();
     let mut cut_and_back = |misbehave: fn(&mut Behaviour), fault: Fault| {
-        run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+        run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
         service.behave(misbehave);
         run_until(&mut device, &service, Vec3::X, |_, _| watch.fault() == Some(fault));
         service.behave(|b| (b.garbage, b.late_ms) = (None, 0));
-        run_until(&mut device, &service, Vec3::X, |_, told| told == Vec3::ZERO);
-        run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+        run_until(&mut device, &service, Vec3::X, |_, received| received == Vec3::ZERO);
+        run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
     };
     cut_and_back(|b| b.late_ms = 60, Fault::ServiceSilent);
     cut_and_back(|b| b.garbage = Some("{\"inverse3\": [".to_owned()), Fault::InvalidMessage);
@@ -122,7 +123,7 @@ fn invalid_and_late_replies_cut_the_force_until_they_end() {
 fn a_loop_that_stops_gets_no_force() {
     let service = Service::start(Behaviour::default());
     let mut device = open(&service).unwrap();
-    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
     for _ in 0..2000 {
         std::thread::sleep(Duration::from_millis(1));
         if told_force(&service) == Vec3::ZERO && device.watch().fault() == Some(Fault::LoopSilent) {
@@ -136,18 +137,20 @@ fn a_loop_that_stops_gets_no_force() {
 fn brake_events_cut_and_restore_the_force() {
     let service = Service::start(Behaviour::default());
     let mut device = open(&service).unwrap();
-    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
     let event = |kind: &str| {
         format!(r#"{{"name":"device-safety-triggered","level":"warning","data":{{"safety_type":"{kind}"}}}}"#)
     };
     service.behave(|b| b.event = Some(event("ebrake_triggered")));
     let watch = device.watch();
-    run_until(&mut device, &service, Vec3::X, |_, told| told == Vec3::ZERO && watch.fault() == Some(Fault::Braked));
+    run_until(&mut device, &service, Vec3::X, |_, received| {
+        received == Vec3::ZERO && watch.fault() == Some(Fault::Braked)
+    });
     service.behave(|b| b.event = Some(event("ebrake_released")));
-    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
     service.behave(|b| b.event = Some(event("stall_detected")));
-    run_until(&mut device, &service, Vec3::X, |_, told| told == Vec3::ZERO);
-    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    run_until(&mut device, &service, Vec3::X, |_, received| received == Vec3::ZERO);
+    run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
 }
 
 #[test]
@@ -174,9 +177,9 @@ fn a_device_that_vanishes_or_a_service_that_hangs_up_is_lost() {
 fn a_silent_service_gets_zero_force_before_it_is_lost() {
     let service = Service::start(Behaviour::default());
     let mut device = open(&service).unwrap();
-    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    run_until(&mut device, &service, Vec3::X, |_, received| received.x > 0.99);
     service.behave(|b| b.mute = true);
-    let cut = |reading: &Reading, told| reading.status == Status::Lost || told == Vec3::ZERO;
+    let cut = |reading: &Reading, received| reading.status == Status::Lost || received == Vec3::ZERO;
     let reading = run_until(&mut device, &service, Vec3::X, cut);
     assert_ne!(reading.status, Status::Lost);
     assert_eq!((told_force(&service), device.watch().fault()), (Vec3::ZERO, Some(Fault::ServiceSilent)));
@@ -201,12 +204,12 @@ fn many_sessions_end_with_a_closing_frame() {
         device.close();
         assert_eq!(device.read(0.0).status, Status::Lost);
         for _ in 0..2000 {
-            if service.told().goodbyes >= session {
+            if service.received().goodbyes >= session {
                 break;
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        assert!(service.told().goodbyes >= session);
-        assert_eq!(service.told().force, Some([0.0; 3]));
+        assert!(service.received().goodbyes >= session);
+        assert_eq!(service.received().force, Some([0.0; 3]));
     }
 }

@@ -51,9 +51,9 @@ fn a_steady_press_keeps_its_force() {
         for (grip, hand) in HANDS {
             for stiffness in [0.3, 0.8, 2.0] {
                 for delay_ticks in [0, 1] {
-                    let told = PassivityConfig { delay_ticks, ..PassivityConfig::default() };
-                    let found = press(config, hand, stiffness, Some(told));
-                    let row = format!("{name}, {grip} grip, {stiffness} N/mm, told {delay_ticks}: {found:?}");
+                    let passivity = PassivityConfig { delay_ticks, ..PassivityConfig::default() };
+                    let found = press(config, hand, stiffness, Some(passivity));
+                    let row = format!("{name}, {grip} grip, {stiffness} N/mm, booked {delay_ticks}: {found:?}");
                     assert!(found.lost.abs() < 0.05 && found.counters.restarted == 0, "{row}");
                     assert!(found.motion_mm < 0.1, "{row}");
                 }
@@ -67,9 +67,10 @@ fn an_unstable_wall_is_damped() {
     for (grip, hand, delay_ticks, stiffness) in [("light", HandModel::LIGHT, 1, 2.0), ("firm", HandModel::FIRM, 2, 2.0)]
     {
         let config = Config { quantum_mm: 0.0, delay_ticks, ..SLIPPERY };
-        let told = PassivityConfig { delay_ticks: delay_ticks as u8, quantum_mm: 0.0, ..PassivityConfig::default() };
+        let passivity =
+            PassivityConfig { delay_ticks: delay_ticks as u8, quantum_mm: 0.0, ..PassivityConfig::default() };
         let without = press(config, hand, stiffness, None);
-        let with = press(config, hand, stiffness, Some(told));
+        let with = press(config, hand, stiffness, Some(passivity));
         assert!(without.motion_mm > 0.4, "{grip}: {without:?}");
         assert!(with.motion_mm < 0.05 && with.lost.abs() < 0.05, "{grip}: {with:?}");
     }

@@ -19,7 +19,7 @@ struct Bench {
     peer: Option<SocketAddr>,
     counter: u32,
     flags: u32,
-    told: Vec3,
+    received_force: Vec3,
     time_ms: f64,
 }
 
@@ -29,7 +29,8 @@ impl Bench {
         socket.set_nonblocking(true).unwrap();
         let config = Config { address: socket.local_addr().unwrap(), workspace: Workspace::default() };
         let driver = Template::open(&config).unwrap();
-        let mut bench = Self { socket, driver, peer: None, counter: 0, flags: 0, told: Vec3::ZERO, time_ms: 0.0 };
+        let mut bench =
+            Self { socket, driver, peer: None, counter: 0, flags: 0, received_force: Vec3::ZERO, time_ms: 0.0 };
         bench.tick(false);
         bench
     }
@@ -71,7 +72,7 @@ impl Bench {
         while let Ok((18, peer)) = self.socket.recv_from(&mut bytes) {
             assert_eq!(&bytes[..2], b"TD");
             let number = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
-            (self.peer, self.told) = (Some(peer), Vec3::new(number(6), number(10), number(14)));
+            (self.peer, self.received_force) = (Some(peer), Vec3::new(number(6), number(10), number(14)));
         }
     }
 }
@@ -90,7 +91,7 @@ fn pose_velocity_buttons_and_force_have_the_right_axes_and_units() {
     // Device: x to the user, y right, z up. Driver: x right, y up, z to the user.
     assert!((reading.tool.tip() - Vec3::new(20.0, 30.0, 10.0)).length() < 1e-4);
     assert!((reading.tool.twist.linear - Vec3::new(0.2, 0.3, 0.1)).length() < 1e-6);
-    assert!((bench.told - Vec3::Y).length() < 1e-6, "{}", bench.told);
+    assert!((bench.received_force - Vec3::Y).length() < 1e-6, "{}", bench.received_force);
 }
 
 #[test]
@@ -100,12 +101,12 @@ fn every_fault_ends_in_no_force_at_once_and_comes_back_slowly() {
         bench.run(400);
         bench.flags = flag;
         bench.run(2);
-        assert_eq!((bench.told, bench.driver.watch().fault()), (Vec3::ZERO, Some(fault)));
+        assert_eq!((bench.received_force, bench.driver.watch().fault()), (Vec3::ZERO, Some(fault)));
         bench.flags = 0;
         bench.run(100);
-        assert_eq!(bench.told, Vec3::ZERO, "it rests");
+        assert_eq!(bench.received_force, Vec3::ZERO, "it rests");
         bench.run(500);
-        assert_eq!((bench.told, bench.driver.watch().fault()), (Vec3::Y, None));
+        assert_eq!((bench.received_force, bench.driver.watch().fault()), (Vec3::Y, None));
     }
 }
 
@@ -115,7 +116,7 @@ fn a_silent_device_is_stale_without_force_then_lost() {
     bench.run(400);
     bench.tick(false);
     let stale = (0..10).map(|_| bench.tick(false)).last().unwrap();
-    assert_eq!((stale.status, bench.told), (Status::Stale, Vec3::ZERO), "within ten ticks");
+    assert_eq!((stale.status, bench.received_force), (Status::Stale, Vec3::ZERO), "within ten ticks");
     assert_eq!(bench.driver.watch().fault(), Some(Fault::ServiceSilent));
     let lost = (0..500).map(|_| bench.tick(false)).last().unwrap();
     assert_eq!((lost.status, bench.driver.watch().fault()), (Status::Lost, Some(Fault::Disconnected)));
@@ -127,7 +128,7 @@ fn invalid_data_cut_the_force_and_old_states_are_skipped() {
     bench.run(400);
     bench.send(b"what?");
     bench.run(1);
-    assert_eq!((bench.told, bench.driver.watch().fault()), (Vec3::ZERO, Some(Fault::InvalidMessage)));
+    assert_eq!((bench.received_force, bench.driver.watch().fault()), (Vec3::ZERO, Some(Fault::InvalidMessage)));
     let old = bench.state(1);
     bench.tick(false);
     bench.send(&old);
@@ -153,11 +154,11 @@ fn a_hundred_sessions_end_without_force() {
     for _ in 0..100 {
         let mut bench = Bench::new();
         bench.run(50);
-        assert!(bench.told.y > 0.1);
+        assert!(bench.received_force.y > 0.1);
         bench.driver.close();
         bench.driver.close();
         bench.listen();
-        assert_eq!((bench.told, bench.driver.read(0.0).status), (Vec3::ZERO, Status::Lost));
+        assert_eq!((bench.received_force, bench.driver.read(0.0).status), (Vec3::ZERO, Status::Lost));
     }
 }
 

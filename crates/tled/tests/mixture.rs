@@ -45,8 +45,8 @@ fn a_stiff_inclusion_settles_where_the_static_reference_is() {
         assert!(moved > 1.0 && error < 2e-3 * moved, "{inside:?}: moved {moved} mm, error {error} mm");
         let mut without = Reference::new(&body.clone().with_material(matrix), &reference::Config::default()).unwrap();
         without.step(&loads, 1.0);
-        let told = distance(exact.positions(), without.positions());
-        assert!(told > 0.02 * moved, "the inclusion must matter for the test to tell: {told} of {moved} mm");
+        let apart = distance(exact.positions(), without.positions());
+        assert!(apart > 0.02 * moved, "the inclusion must matter for the test to tell: {apart} of {moved} mm");
     }
 }
 

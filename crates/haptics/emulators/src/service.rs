@@ -86,7 +86,7 @@ pub struct ReceivedCalls {
 
 struct Shared {
     behaviour: Mutex<Behaviour>,
-    told: Mutex<ReceivedCalls>,
+    received: Mutex<ReceivedCalls>,
     changed: Mutex<Instant>,
     closing: AtomicBool,
 }
@@ -95,15 +95,15 @@ impl Shared {
     /// Starts the clock of a fault.
     fn begin(&self) {
         *self.changed.lock().unwrap() = Instant::now();
-        self.told.lock().unwrap().no_force_after = None;
+        self.received.lock().unwrap().no_force_after = None;
     }
 
     /// Sets the force on the motors.
     fn drive(&self, force: [f64; 3]) {
-        let mut told = self.told.lock().unwrap();
-        told.force = Some(force);
-        if force == [0.0; 3] && told.no_force_after.is_none() {
-            told.no_force_after = Some(self.changed.lock().unwrap().elapsed());
+        let mut received = self.received.lock().unwrap();
+        received.force = Some(force);
+        if force == [0.0; 3] && received.no_force_after.is_none() {
+            received.no_force_after = Some(self.changed.lock().unwrap().elapsed());
         }
     }
 }
@@ -123,7 +123,7 @@ impl Service {
     pub fn start(behaviour: Behaviour) -> Self {
         let shared = Arc::new(Shared {
             behaviour: Mutex::new(behaviour),
-            told: Mutex::default(),
+            received: Mutex::default(),
             changed: Mutex::new(Instant::now()),
             closing: AtomicBool::new(false),
         });
@@ -140,8 +140,8 @@ impl Service {
     }
 
     /// What it received so far.
-    pub fn told(&self) -> ReceivedCalls {
-        self.shared.told.lock().unwrap().clone()
+    pub fn received(&self) -> ReceivedCalls {
+        self.shared.received.lock().unwrap().clone()
     }
 }
 
@@ -184,22 +184,22 @@ fn simulate(shared: &Shared, mut socket: WebSocket<TcpStream>) {
     let b = behaviour();
     send(socket.get_mut(), text(b.inventory.clone().unwrap_or_else(|| state(&b)), true));
     while !shared.closing.load(Ordering::SeqCst) && !behaviour().hang_up {
-        let received = socket.read();
-        let mut told = shared.told.lock().unwrap();
-        match received {
+        let message = socket.read();
+        let mut received = shared.received.lock().unwrap();
+        match message {
             Ok(Message::Text(message)) => {
-                drop(told);
+                drop(received);
                 note(shared, &message);
                 reply(socket.get_mut(), &behaviour());
             }
-            Ok(Message::Close(_)) => told.goodbyes += 1,
-            Ok(Message::Pong(_)) => told.pongs += 1,
-            Ok(_) => told.misuse += 1,
+            Ok(Message::Close(_)) => received.goodbyes += 1,
+            Ok(Message::Pong(_)) => received.pongs += 1,
+            Ok(_) => received.misuse += 1,
             Err(error) if is_timeout(&error) => {}
             Err(Error::Io(_) | Error::ConnectionClosed) => break,
             Err(Error::Protocol(ProtocolError::ResetWithoutClosingHandshake)) => break,
             Err(_) => {
-                told.misuse += 1;
+                received.misuse += 1;
                 break;
             }
         }
@@ -262,27 +262,27 @@ fn state(b: &Behaviour) -> String {
 }
 
 fn note(shared: &Shared, message: &str) {
-    let mut told = shared.told.lock().unwrap();
-    told.messages += 1;
+    let mut received = shared.received.lock().unwrap();
+    received.messages += 1;
     let Ok(message) = serde_json::from_str::<serde_json::Value>(message) else {
-        told.misuse += 1;
+        received.misuse += 1;
         return;
     };
     if let Some(profile) = message["session"]["configure"]["profile"]["name"].as_str() {
-        told.profile = Some(profile.to_owned());
+        received.profile = Some(profile.to_owned());
     }
     let device = &message["inverse3"][0];
     if device["device_id"] != "049D" {
-        told.misuse += 1;
+        received.misuse += 1;
     }
-    told.probes += u32::from(!device["commands"]["probe_position"].is_null());
+    received.probes += u32::from(!device["commands"]["probe_position"].is_null());
     let vector = &device["commands"]["set_cursor_force"]["vector"];
     let force = ["x", "y", "z"].map(|axis| vector[axis].as_f64());
     if let [Some(x), Some(y), Some(z)] = force {
-        drop(told);
+        drop(received);
         shared.drive([x, y, z]);
     } else if !vector.is_null() {
-        told.misuse += 1;
+        received.misuse += 1;
     }
 }
 

@@ -117,8 +117,9 @@ impl Sessions {
     pub fn page(&self) -> Page<Action> {
         let words = self.only.to_lowercase();
         let has_words = |text: &str| words.split_whitespace().all(|word| text.to_lowercase().contains(word));
-        let shown = self.rows.iter().map(|session| (session, told(session)));
-        let rows: Vec<_> = shown.filter(|(_, told)| has_words(&told.join(", "))).map(|row| self.row(row)).collect();
+        let shown = self.rows.iter().map(|session| (session, summary(session)));
+        let rows: Vec<_> =
+            shown.filter(|(_, summary)| has_words(&summary.join(", "))).map(|row| self.row(row)).collect();
         let (all, count_of) = (self.rows.len(), count(rows.len(), "session"));
         let none = rows.is_empty().then(|| match all {
             0 => Item::Text("No session was kept yet.".into()),
@@ -137,7 +138,7 @@ impl Sessions {
         }
     }
 
-    fn row(&self, (session, told): (&SessionRow, Vec<String>)) -> Item<Action> {
+    fn row(&self, (session, summary): (&SessionRow, Vec<String>)) -> Item<Action> {
         let folder = session.folder.clone();
         let compare = Action::Compare(folder.clone());
         let compare = match &self.first {
@@ -146,17 +147,17 @@ impl Sessions {
             None => Item::button("Compare", "then choose another one", compare),
         };
         Item::Row(vec![
-            Item::button(told[0].clone(), "its result", Action::Result(folder.clone())),
+            Item::button(summary[0].clone(), "its result", Action::Result(folder.clone())),
             Item::button("Report", "in the browser", Action::Report(folder.clone())),
             Item::button("Replay", "shows it again", Action::Replay(folder)),
             compare,
-            Item::Note(told[1..].join(", ")),
+            Item::Note(summary[1..].join(", ")),
         ])
     }
 }
 
-/// What is told of a session; date, time and name first.
-fn told(session: &SessionRow) -> Vec<String> {
+/// Describes a session in short parts; date, time and name first.
+fn summary(session: &SessionRow) -> Vec<String> {
     let title = when(&session.folder.file_name().unwrap_or_default().to_string_lossy());
     let passed = session.passed.map(|passed| String::from(if passed { "passed" } else { "not passed" }));
     let dice = session.dice.map(|dice| format!("Dice {dice:.2}"));

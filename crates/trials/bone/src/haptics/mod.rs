@@ -162,9 +162,9 @@ fn run_loop(coupling: &Coupling, intent: Vec<ToolState>, ticks: usize, guarded: 
     let Coupling { device: config, hand, mut wall, tick_ms, .. } = *coupling;
     let judged_ticks = coupling.ticks(JUDGED_MS);
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
-    let told = device.capabilities().guard_config();
-    let passivity = told.passivity.filter(|_| guarded);
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..told });
+    let limits = device.capabilities().guard_config();
+    let passivity = limits.passivity.filter(|_| guarded);
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..limits });
     let (mut motors, mut to_hand) = (Account::default(), Account::default());
     let mut ways = [(f32::MAX, f32::MIN); 2];
     let (mut wanted_n, mut given_n) = (0.0f32, 0.0f32);

@@ -193,12 +193,12 @@ pub fn cycle_mm(
         held(normal * (RADIUS_MM - pressed), normal)
     });
     let mut device = Simulated::new(config, HAND, Box::new(Replay::new(intent.collect())));
-    let told = device.capabilities().guard_config();
-    let passivity = told.passivity.filter(|_| guarded);
+    let limits = device.capabilities().guard_config();
+    let passivity = limits.passivity.filter(|_| guarded);
     // Without the controller only the clamp is left: no slew limit, which would damp or feed an
     // oscillation.
-    let slew = if guarded { told.slew_n_per_ms } else { 1e3 };
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, slew_n_per_ms: slew, ..told });
+    let slew = if guarded { limits.slew_n_per_ms } else { 1e3 };
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, slew_n_per_ms: slew, ..limits });
     let mut wall = match method {
         None => Wall::Exact,
         Some(method) => Wall::Voxels(bone, method.build(&Tool::burr(RADIUS_MM))),

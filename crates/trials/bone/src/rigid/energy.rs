@@ -72,9 +72,9 @@ fn given_j(method: &Method, bone: &BoneVolume, normal: Vec3, mut random: fastran
     let intent = wandering(&mut random, normal);
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
     let capable = device.capabilities();
-    let told = capable.guard_config();
-    let passivity = told.passivity.filter(|_| guarded);
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..told });
+    let limits = capable.guard_config();
+    let passivity = limits.passivity.filter(|_| guarded);
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..limits });
     let (mut contact, mut model) = (method.build(&Tool::burr(RADIUS_MM)), capable.coupled(Viscoelastic::BONE, 1.0));
     let mut out = RigidStep::default();
     let (mut taken_nmm, mut lowest_nmm) = (0.0f64, 0.0f64);

@@ -156,12 +156,12 @@ fn hand(site: &Site, task: Task, radius_mm: f32, mut hold: impl FnMut(DVec3, boo
     let tick = |ms: usize| {
         let (goal, works) = meant(ms);
         // The device says where it is in f32.
-        let told = device.as_vec3().as_dvec3();
-        let lifted = hold(told, works);
+        let place = device.as_vec3().as_dvec3();
+        let lifted = hold(place, works);
         let force = SPRING * (goal - device) - DAMPING * speed + f64::from(STIFFNESS) * lifted;
         speed += force / MASS_G;
         device += speed;
-        Tick { device: told, lifted, works }
+        Tick { device: place, lifted, works }
     };
     (0..site.times_ms.iter().sum()).map(tick).collect()
 }

@@ -118,8 +118,8 @@ fn record(bone: &BoneVolume, place: Place, task: Task, file: &Path) -> anyhow::R
         }
     };
     let mut device = Simulated::new(Config::default(), HandModel::FIRM, intent);
-    let told = device.capabilities().guard_config();
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..told });
+    let limits = device.capabilities().guard_config();
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..limits });
     let (mut contact, mut model) = (Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM)), Viscoelastic::BONE);
     let config = [("place", place.name()), ("task", task.name())].map(|(k, v)| (k.to_string(), v.to_string()));
     let header = SessionHeader {

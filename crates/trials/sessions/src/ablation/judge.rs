@@ -184,7 +184,7 @@ fn beyond(row: &Row) -> String {
         ("picture", "picture_change_percent", PICTURE_PERCENT, "%"),
     ];
     let missed = parts.iter().filter(|(_, name, limit, _)| number(row, name) > *limit);
-    let told = missed.map(|(what, name, limit, unit)| {
+    let parts = missed.map(|(what, name, limit, unit)| {
         format!("{what} by {} {unit} ({} allowed)", short(number(row, name)), short(*limit))
     });
     let cores = number(row, "cpu_s_per_s");
@@ -192,7 +192,7 @@ fn beyond(row: &Row) -> String {
     format!(
         "{} changes more than the tolerance: {}. It costs {} cores ({:+.0} %) and {:+.1} MB.",
         row.method,
-        told.collect::<Vec<_>>().join(", "),
+        parts.collect::<Vec<_>>().join(", "),
         signed(change),
         100.0 * change / (cores - change),
         number(row, "memory_change_mb"),

@@ -58,7 +58,7 @@ pub fn findings(table: &CaseFixture) -> Findings {
     findings.rows.push(expert.row("expert"));
     findings.rows.extend(novices.iter().map(|novice| novice.row("novice")));
     let all = |worse: &dyn Fn(&Operated) -> bool| novices.iter().filter(|novice| worse(novice)).count() as f64;
-    for (name, told) in [
+    for (name, reported) in [
         ("path", all(&|n| n.scores.path_mm > 1.05 * expert.scores.path_mm)),
         ("smoothness", all(&|n| n.jerk() < expert.jerk() - 0.5)),
         ("plunge", all(&|n| n.scores.plunge_mm > expert.scores.plunge_mm + 1.0)),
@@ -67,7 +67,7 @@ pub fn findings(table: &CaseFixture) -> Findings {
     ] {
         findings.gates.push(Gate::at_least(
             format!("novices whose {name} is worse than the expert's, of 3"),
-            told,
+            reported,
             3.0,
         ));
     }
@@ -145,10 +145,10 @@ fn checked(bench: &Bench) -> (u64, u64) {
     let (mut late, mut odd) = (0, 0);
     for (warning, cause) in causes {
         let is = |what: &What| matches!(what, What::Warning(w, true, _) if *w == warning);
-        let told: Vec<u64> = bench.notices.iter().filter(|n| is(&n.what)).map(|n| n.tick).collect();
+        let reported: Vec<u64> = bench.notices.iter().filter(|n| is(&n.what)).map(|n| n.tick).collect();
         let due = due(&bench.records, cause);
-        odd += told.len().abs_diff(due.len()) as u64;
-        late = told.iter().zip(&due).map(|(told, due)| told.abs_diff(*due)).max().unwrap_or(0).max(late);
+        odd += reported.len().abs_diff(due.len()) as u64;
+        late = reported.iter().zip(&due).map(|(reported, due)| reported.abs_diff(*due)).max().unwrap_or(0).max(late);
     }
     (late, odd)
 }

@@ -199,7 +199,7 @@ fn tally(first: u64, holes: Vec<Hole>) -> Row {
     let through = || outcomes.iter().filter(|(_, outcome)| outcome.through.is_some());
     let short = || outcomes.iter().filter(|(_, outcome)| outcome.through.is_none());
     let before = |outcome: &Outcome, event: Option<u64>| {
-        event.is_none_or(|event| outcome.announced.is_some_and(|told| told < event))
+        event.is_none_or(|event| outcome.announced.is_some_and(|announced| announced < event))
     };
     let leads: Vec<f64> = through().filter_map(|(_, o)| Some(o.through? as f64 - o.announced? as f64)).collect();
     let told_contact = through().filter(|(_, o)| o.announced.is_some() && before(o, o.contact));

@@ -35,8 +35,8 @@ fn read() -> anyhow::Result<Findings> {
     let file = out.join("session.mcap");
     let own = Recording::open(&file)?;
     let rerun = workshop.at("session.rrd");
-    let told = workshop.run([&file, &rerun])?;
-    let facts: Vec<Vec<&str>> = told.lines().map(|line| line.split(' ').collect()).collect();
+    let output = workshop.run([&file, &rerun])?;
+    let facts: Vec<Vec<&str>> = output.lines().map(|line| line.split(' ').collect()).collect();
     let count = |kind: &str, topic: &str| {
         let fact = facts.iter().find(|fact| fact[0] == kind && fact.get(1) == Some(&topic));
         fact.and_then(|fact| fact.last()?.parse::<f64>().ok()).unwrap_or(f64::NAN)

@@ -28,17 +28,17 @@ pub const FAMILY: Family<Method> = Family {
 
 fn methods(_: Scope) -> Vec<Candidate<Method>> {
     let candidate = |method: Method| {
-        let told = method.descriptor();
-        let standing = if told.is_oracle {
+        let descriptor = method.descriptor();
+        let standing = if descriptor.is_oracle {
             Standing::Oracle
         } else if method == Method::RECOMMENDED {
             Standing::Own
         } else {
-            Standing::by_name(told.name)
+            Standing::by_name(descriptor.name)
         };
         // The oracle is too slow for a way of a thousand steps.
-        let conditions = if told.is_oracle { &CONDITIONS[..POINTWISE] } else { &CONDITIONS[..] };
-        Candidate { name: told.name.into(), standing, method, conditions }
+        let conditions = if descriptor.is_oracle { &CONDITIONS[..POINTWISE] } else { &CONDITIONS[..] };
+        Candidate { name: descriptor.name.into(), standing, method, conditions }
     };
     Method::all().into_iter().map(candidate).collect()
 }

@@ -33,13 +33,13 @@ pub const FAMILY: Family<Option<Method>> = Family {
 /// Every method, and the exact wall: where it fails too, no method could do better.
 fn methods(scope: Scope) -> Vec<Candidate<Option<Method>>> {
     let candidate = |method: Method| {
-        let told = method.descriptor();
-        let standing = if told.is_oracle {
+        let descriptor = method.descriptor();
+        let standing = if descriptor.is_oracle {
             Standing::Oracle
-        } else if told.source == Method::RECOMMENDED.descriptor().source {
+        } else if descriptor.source == Method::RECOMMENDED.descriptor().source {
             Standing::Own
         } else {
-            Standing::by_name(told.name)
+            Standing::by_name(descriptor.name)
         };
         // The oracle is too slow for a loop of thousands of ticks; a quick run leaves out two.
         let first = match standing {
@@ -48,7 +48,7 @@ fn methods(scope: Scope) -> Vec<Candidate<Option<Method>>> {
             Standing::Thesis | Standing::Rival => scope.pick(2, 0),
         };
         let conditions = &CONDITIONS[first..];
-        Candidate { name: told.name.into(), standing, method: Some(method), conditions }
+        Candidate { name: descriptor.name.into(), standing, method: Some(method), conditions }
     };
     let name = "wall in closed form, no method".into();
     let exact = Candidate { name, standing: Standing::Oracle, method: None, conditions: &CONDITIONS[..HANDS] };

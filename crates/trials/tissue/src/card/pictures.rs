@@ -66,9 +66,9 @@ pub fn run(gpu: &Gpu, scope: Scope, findings: &mut Findings) {
             }
             let mut by_processor = ProcessorRenderer::new(&data, *size).expect("the scene loads");
             let times = Samples::of(3, |turn| _ = by_processor.draw(&shown(turn, both)).expect("drawn"));
-            let told = row(&scene, format!("processor, {} threads", by_processor.threads));
+            let found = row(&scene, format!("processor, {} threads", by_processor.threads));
             let ms = 1e-3 * times.quantile(0.5);
-            findings.rows.push(told.metric("frame_p50_ms", ms).metric("frames_per_s", 1e3 / ms));
+            findings.rows.push(found.metric("frame_p50_ms", ms).metric("frames_per_s", 1e3 / ms));
         }
     }
     let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
@@ -85,7 +85,7 @@ pub fn run(gpu: &Gpu, scope: Scope, findings: &mut Findings) {
         (0..12i32.pow(3)).for_each(|n| bone.set_hu(at + IVec3::new(n % 12, n / 12 % 12, n / 144), AIR_HU));
         draw(round);
     });
-    let told = row("bone at 1280x800, a ball of bone drilled between pictures", gpu.name());
+    let found = row("bone at 1280x800, a ball of bone drilled between pictures", gpu.name());
     let [still, drilled] = [still, drilled].map(|times| 1e-3 * times.quantile(0.5));
-    findings.rows.push(told.metric("frame_p50_ms", drilled).metric("upload_ms", drilled - still));
+    findings.rows.push(found.metric("frame_p50_ms", drilled).metric("upload_ms", drilled - still));
 }

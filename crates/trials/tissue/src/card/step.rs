@@ -126,8 +126,8 @@ pub fn run(gpu: &Gpu, scope: Scope, findings: &mut Findings) {
         None
     });
     if let Some(floors) = floors {
-        let told = row("floors", gpu.name()).metric("copy_gb_per_s", floors.gb_per_s);
-        findings.rows.push(told.metric("fma_gflop_per_s", floors.gflop_per_s));
+        let found = row("floors", gpu.name()).metric("copy_gb_per_s", floors.gb_per_s);
+        findings.rows.push(found.metric("fma_gflop_per_s", floors.gflop_per_s));
     }
     let count = if gpu.is_software() { 1 } else { SIZES.len() };
     for cells in &SIZES[..count] {
@@ -161,7 +161,7 @@ fn time(
     let device = Samples::from(timed.iter().map(|(us, _)| us / f64::from(steps.min(TIMED))).collect::<Vec<_>>());
     let device_us = device.quantile(0.5);
     let scene = format!("{tets} tetrahedra, {}", kind.name);
-    let mut told = row(&scene, gpu.name())
+    let mut found = row(&scene, gpu.name())
         .with("tets", tets)
         .metric("wall_us", wall_us)
         .metric("wall_spread_percent", 100.0 * wall.spread())
@@ -180,10 +180,10 @@ fn time(
         let bytes_us = 1e-3 * kind.bytes(&body) / floors.gb_per_s;
         let flops_us = 1e-3 * kind.flops * tets as f64 / floors.gflop_per_s;
         over = wall_us / bytes_us;
-        told = told.metric("bytes_floor_us", bytes_us).metric("flops_floor_us", flops_us);
-        told = told.metric("wall_over_bytes_floor", over);
+        found = found.metric("bytes_floor_us", bytes_us).metric("flops_floor_us", flops_us);
+        found = found.metric("wall_over_bytes_floor", over);
     }
-    findings.rows.push(told);
+    findings.rows.push(found);
     findings.rows.extend((passes > 0).then_some(apart));
     // The processor beside it, where it is quick enough.
     if tets < 300_000 {
@@ -192,8 +192,8 @@ fn time(
             let mut solver = Tled::new(&body, &Config { threads, ..kind.config }).expect("the block is sound");
             let dt_ms = solver.stable_dt_ms();
             let us = Samples::of(scope.pick(10, 40), |_| _ = solver.step(&gravity(), dt_ms)).quantile(0.5);
-            let told = row(&scene, format!("processor, threads {threads}")).with("tets", tets);
-            findings.rows.push(told.metric("wall_us", us).metric("tetrahedron_steps_per_s", 1e6 * tets as f64 / us));
+            let found = row(&scene, format!("processor, threads {threads}")).with("tets", tets);
+            findings.rows.push(found.metric("wall_us", us).metric("tetrahedron_steps_per_s", 1e6 * tets as f64 / us));
         }
     }
     if gpu.is_software() {
@@ -236,18 +236,18 @@ pub fn contact(gpu: &Gpu, scope: Scope, findings: &mut Findings) {
             Samples::of(scope.pick(20, 200), |_| _ = solver.step(&loads, substeps * 0.99 * dt_ms))
         };
         warm(|_| _ = solver.step(&loads, 0.99 * dt_ms));
-        let mut told = row(format!("{} tetrahedra, {springs} contacts", body.mesh.tets.len()), gpu.name());
+        let mut found = row(format!("{} tetrahedra, {springs} contacts", body.mesh.tets.len()), gpu.name());
         for (name, substeps) in [("call", 1.0), ("call_of_3_substeps", 3.0)] {
             let times = calls(&mut solver, substeps);
-            told = told.metric(&format!("{name}_p50_us"), times.quantile(0.5));
-            told = told.metric(&format!("{name}_p99_us"), times.quantile(0.99));
+            found = found.metric(&format!("{name}_p50_us"), times.quantile(0.5));
+            found = found.metric(&format!("{name}_p99_us"), times.quantile(0.99));
         }
         if let Ok((_, passes)) = solver.timed(16) {
             for pass in passes {
-                told = told.metric(&format!("{}_us", pass.name), pass.us);
+                found = found.metric(&format!("{}_us", pass.name), pass.us);
             }
         }
-        findings.rows.push(told);
+        findings.rows.push(found);
     }
 }
 

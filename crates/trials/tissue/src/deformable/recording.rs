@@ -58,8 +58,8 @@ fn record(scene: &Scene, meant: &[Vec3], name: &str, file: &Path) -> anyhow::Res
         |(tick, tip): (usize, &Vec3)| ToolState { time_ms: tick as f64, ..ToolState::at(Pose::from_translation(*tip)) };
     let intent = Replay::new(meant.iter().enumerate().map(state).collect());
     let mut device = Simulated::new(simulated::Config::default(), HandModel::FIRM, Box::new(intent));
-    let told = device.capabilities().guard_config();
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..told });
+    let limits = device.capabilities().guard_config();
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..limits });
     let (mut collision, mut model) =
         (TissueCollision::new(&scene.mesh, &Tool::probe(RADIUS_MM), &Config::default())?, Viscoelastic::BRAIN);
     let header = SessionHeader {

@@ -96,8 +96,8 @@ fn fill(workshop: &Workshop, name: &str, ending: &str, own: &TetMesh, target: us
     let (from, to) = (workshop.at("surface.obj"), workshop.at("filled"));
     let surface = Surface::of(own).to_tri_mesh(&own.positions);
     obj::write(&from, &surface)?;
-    let told = workshop.run([OsStr::new(name), from.as_os_str(), OsStr::new(&target.to_string()), to.as_os_str()])?;
-    let seconds = told.lines().find_map(|line| line.strip_prefix("seconds ")?.parse().ok());
+    let output = workshop.run([OsStr::new(name), from.as_os_str(), OsStr::new(&target.to_string()), to.as_os_str()])?;
+    let seconds = output.lines().find_map(|line| line.strip_prefix("seconds ")?.parse().ok());
     let mesh = read(&to.with_extension(ending))?;
     Ok((mesh, seconds.context("it does not tell its seconds")?))
 }

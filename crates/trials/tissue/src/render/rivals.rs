@@ -93,8 +93,8 @@ fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>> {
     });
     let files = [("volume.raw", bytes), ("scene.json", scene.to_string().into())];
     files.into_iter().try_for_each(|(name, bytes)| std::fs::write(at(name), bytes))?;
-    let told = workshop.run([at("scene.json"), at("picture")])?;
-    let ms = told.lines().filter_map(|line| line.strip_prefix("ms ")?.split_once(' ')?.1.parse::<f64>().ok());
+    let output = workshop.run([at("scene.json"), at("picture")])?;
+    let ms = output.lines().filter_map(|line| line.strip_prefix("ms ")?.split_once(' ')?.1.parse::<f64>().ok());
     let image = |n: usize| read(&at(&format!("picture{n}.rgb")), size);
     let finest = image(0)?;
     let theirs = ms

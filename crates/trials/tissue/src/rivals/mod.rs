@@ -273,8 +273,8 @@ fn theirs(program: &'static Program, scope: Scope, findings: &mut Findings) -> R
         });
         std::fs::write(workshop.at("scene.json"), scene.to_string())?;
         for threads in program.threads {
-            let told = workshop.run(["scene.json", &threads.to_string()])?;
-            for line in told.lines().filter(|line| line.starts_with('{')) {
+            let output = workshop.run(["scene.json", &threads.to_string()])?;
+            for line in output.lines().filter(|line| line.starts_with('{')) {
                 let run: Run = serde_json::from_str(line)?;
                 let name = if program.own_meshes { "hanging block, own meshes".into() } else { scene_name(&body.mesh) };
                 let row = run.row(&name, program.name, finest).with("threads", *threads);

@@ -33,10 +33,10 @@ pub fn draw(findings: &mut Findings) {
     let mut scenes: Vec<(&str, Vec<(&str, bool)>)> = Vec::new();
     for row in &findings.rows {
         let Some(held) = row.metrics.get(HELD) else { continue };
-        let told = (row.method.as_str(), *held > 0.5);
+        let entry = (row.method.as_str(), *held > 0.5);
         match scenes.last_mut().filter(|(scene, _)| *scene == row.scene) {
-            Some((_, methods)) => methods.push(told),
-            None => scenes.push((&row.scene, vec![told])),
+            Some((_, methods)) => methods.push(entry),
+            None => scenes.push((&row.scene, vec![entry])),
         }
     }
     let names = |methods: &[(&str, bool)]| methods.iter().map(|(name, _)| name.to_string()).collect::<Vec<_>>();
@@ -47,7 +47,7 @@ pub fn draw(findings: &mut Findings) {
         y: "scene".into(),
         columns: (1..=scenes[0].1.len()).map(|i| i.to_string()).collect(),
         rows: scenes.iter().map(|(scene, _)| scene.to_string()).collect(),
-        cells: scenes.iter().map(|(_, told)| told.iter().map(|(_, held)| cell(*held)).collect()).collect(),
+        cells: scenes.iter().map(|(_, entry)| entry.iter().map(|(_, held)| cell(*held)).collect()).collect(),
         ..Map::default()
     };
     let maps: Vec<Map> = scenes.chunk_by(|a, b| names(&a.1) == names(&b.1)).map(map).collect();
@@ -144,9 +144,9 @@ fn stretched(findings: &mut Findings) {
             let (left, reported) = released(&mut solver, &body);
             let scene = format!("let go at stretch {stretch}");
             let (held, wanted) = (left < 0.2, method == "neo-Hookean");
-            let told = f64::from(held || wanted && reported > 0);
+            let entry = f64::from(held || wanted && reported > 0);
             let row = Row::new(&scene, method).metric("left_mm", left).metric("reported_count", f64::from(reported));
-            findings.rows.push(row.metric(HELD, told));
+            findings.rows.push(row.metric(HELD, entry));
             if wanted {
                 let name = format!("{scene}, {method}: comes back or reports");
                 findings.gates.push(Gate::at_least(name, f64::from(held || reported > 0), 1.0));

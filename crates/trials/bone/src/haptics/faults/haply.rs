@@ -74,7 +74,7 @@ impl Inverse {
         if self.began.is_some() {
             thread::sleep(TICK);
         }
-        while self.began.is_none() && self.service.told().messages == messages && asked.elapsed() < PATIENCE {
+        while self.began.is_none() && self.service.received().messages == messages && asked.elapsed() < PATIENCE {
             thread::yield_now();
         }
     }
@@ -82,16 +82,16 @@ impl Inverse {
 
 impl Bench for Inverse {
     fn tick(&mut self) -> MotorForce {
-        let messages = self.service.told().messages;
+        let messages = self.service.received().messages;
         if !self.silent {
             let now_ms = self.now_ms();
             self.hand.tick(now_ms);
         }
         self.wait(messages);
-        let told = self.service.told();
-        let force_n = told.force.unwrap_or_default().iter().map(|n| n * n).sum::<f64>().sqrt();
+        let received = self.service.received();
+        let force_n = received.force.unwrap_or_default().iter().map(|n| n * n).sum::<f64>().sqrt();
         // The service records most precisely when the force ended.
-        let at_ms = match (self.began, told.no_force_after) {
+        let at_ms = match (self.began, received.no_force_after) {
             (Some(began), Some(after)) if force_n == 0.0 => ((began - self.start) + after).as_secs_f64() * 1e3,
             _ => self.now_ms(),
         };
@@ -160,7 +160,7 @@ fn at_opening() -> Vec<Row> {
     let refusal = |(name, behaviour, words)| {
         let service = Service::start(behaviour);
         let opened = open(&service);
-        let force = service.told().force.unwrap_or_default();
+        let force = service.received().force.unwrap_or_default();
         refused(DRIVER, name, opened, words, force.into_iter().map(f64::abs).sum())
     };
     let nobody = Config { service: "127.0.0.1:1".into(), ..Config::default() };

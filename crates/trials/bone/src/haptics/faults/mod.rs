@@ -116,11 +116,11 @@ impl<D: HapticDevice> Loop<D> {
 struct Course {
     before_n: f64,
     no_force_ms: f64,
-    told_ms: f64,
+    reported_ms: f64,
     after_n: f64,
     largest_n: f64,
     rise_n: f64,
-    told: Option<Fault>,
+    reported: Option<Fault>,
     /// Longest tick after the fault, ms.
     held_ms: f64,
 }
@@ -141,11 +141,11 @@ fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
     let mut course = Course {
         before_n: before.force_n,
         no_force_ms: f64::INFINITY,
-        told_ms: f64::INFINITY,
+        reported_ms: f64::INFINITY,
         after_n: before.force_n,
         largest_n,
         rise_n,
-        told: None,
+        reported: None,
         held_ms: 0.0,
     };
     for _ in 0..WATCHED_TICKS {
@@ -159,8 +159,8 @@ fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
         if now.force_n == 0.0 {
             course.no_force_ms = course.no_force_ms.min(passed_ms);
         }
-        if let (None, Some(fault)) = (course.told, bench.fault()) {
-            (course.told, course.told_ms) = (Some(fault), passed_ms);
+        if let (None, Some(fault)) = (course.reported, bench.fault()) {
+            (course.reported, course.reported_ms) = (Some(fault), passed_ms);
         }
     }
     course
@@ -178,42 +178,42 @@ fn row<B>(driver: &str, case: &Case<B>, courses: &[Course]) -> Row {
         return Row::new(case.name, driver);
     };
     let row = Row::new(case.name, driver)
-        .with("told", own.told.map_or_else(|| "nothing".to_owned(), |fault| fault.to_string()))
+        .with("told", own.reported.map_or_else(|| "nothing".to_owned(), |fault| fault.to_string()))
         .metric("force_before_n", own.before_n)
         .metric("force_after_n", own.after_n)
         .metric("largest_force_n", worst(|course| course.largest_n))
         .metric("largest_rise_n", worst(|course| course.rise_n));
     match case.then {
-        Then::Kept => row.with("kind", "kept").with("told_what_to_do", own.told.is_none()),
+        Then::Kept => row.with("kind", "kept").with("told_what_to_do", own.reported.is_none()),
         Then::Cut(fault) => row
             .with("kind", "cut")
-            .with("told_what_to_do", own.told == Some(fault))
+            .with("told_what_to_do", own.reported == Some(fault))
             .metric("no_force_ms", own.no_force_ms)
             .metric("slowest_no_force_ms", worst(|course| course.no_force_ms))
-            .metric("told_ms", own.told_ms),
+            .metric("told_ms", own.reported_ms),
     }
 }
 
 /// Row of a device that must refuse to open with a message containing `words`; `force_n` is the
 /// motor force then.
 fn refused<D>(driver: &str, name: &str, opened: Result<D, DeviceError>, words: &str, force_n: f64) -> Row {
-    let told = opened.err().map_or_else(|| "it opened".to_owned(), |error| error.to_string());
+    let reported = opened.err().map_or_else(|| "it opened".to_owned(), |error| error.to_string());
     Row::new(name, driver)
         .with("kind", "refused")
-        .with("told_what_to_do", told.contains(words))
-        .with("told", without_folders(&told))
+        .with("told_what_to_do", reported.contains(words))
+        .with("told", without_folders(&reported))
         .metric("force_after_n", force_n)
 }
 
 /// The message without folders in its paths, so that it is the same in every run.
-fn without_folders(told: &str) -> String {
+fn without_folders(reported: &str) -> String {
     let file = |word: &str| {
         let path = Path::new(word);
         path.file_name()
             .filter(|_| path.is_absolute())
             .map_or_else(|| word.into(), |name| name.to_string_lossy().into_owned())
     };
-    told.split(' ').map(file).collect::<Vec<_>>().join(" ")
+    reported.split(' ').map(file).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -222,8 +222,8 @@ mod tests {
 
     #[test]
     fn messages_contain_no_folder_of_this_run() {
-        let told = format!("{} lacks a/b", std::env::temp_dir().join("run-1").join("lib.so:").display());
-        assert_eq!(without_folders(&told), "lib.so: lacks a/b");
+        let reported = format!("{} lacks a/b", std::env::temp_dir().join("run-1").join("lib.so:").display());
+        assert_eq!(without_folders(&reported), "lib.so: lacks a/b");
     }
 
     /// Device whose force ends some ticks after the fault.
