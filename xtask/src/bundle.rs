@@ -82,13 +82,13 @@ pub fn check(root: &Path) -> Result<()> {
         let mut measure = Command::new(place.join("bundle/measure"));
         measure.args(["--software", "--quick", "agreement"]).current_dir(&place);
         measure.env_clear().envs([("HOME", &place), ("PATH", &"/usr/bin:/bin".into())]);
-        let told = measure.output().context("the bundle's measure")?;
-        let (said, fault) = (String::from_utf8_lossy(&told.stdout), String::from_utf8_lossy(&told.stderr));
+        let output = measure.output().context("the bundle's measure")?;
+        let (text, fault) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         if fault.contains("no Vulkan driver") && std::env::var_os("CI").is_none() {
             println!("skipped: no Vulkan driver here, so the bundle is not run");
             return Ok(());
         }
-        ensure!(told.status.success() && place.join("measured/card.html").is_file(), "the bundle: {said}{fault}");
+        ensure!(output.status.success() && place.join("measured/card.html").is_file(), "the bundle: {text}{fault}");
         Ok(())
     });
     fs::remove_dir_all(&place).context("the bundle's folder")?;

@@ -125,17 +125,17 @@ fn a_monkey_breaks_nothing_and_cuts_nothing_outside_the_view() {
         monkey.keys = true;
         acts += monkey.plays(left());
         person.rests(1.0);
-        let said = person.said();
-        assert!(!said.contains("panicked"), "{said}");
+        let log = person.log();
+        assert!(!log.contains("panicked"), "{log}");
         // Somebody who closes the window after an error sees it once more on the console.
         let code = person.code();
-        assert!(matches!(code, None | Some(0 | 2)), "the program ended with {code:?}:\n{said}");
+        assert!(matches!(code, None | Some(0 | 2)), "the program ended with {code:?}:\n{log}");
         let recordings = person.recordings();
         for (recording, is_whole) in &recordings {
             let over_n = over_limit_n(recording);
             assert!(over_n <= 1e-4, "the guard let {over_n} N too much through");
             let runs = code.is_none() && std::ptr::eq(recording, &recordings.last().unwrap().0);
-            assert!(*is_whole || runs, "a session that ended has no summary:\n{said}");
+            assert!(*is_whole || runs, "a session that ended has no summary:\n{log}");
         }
         let ticks: usize = recordings.iter().map(|(recording, _)| recording.ticks.len()).sum();
         eprintln!("{acts} acts, {} session(s) of {:.0} s, ended with {code:?}", recordings.len(), ticks as f64 * 1e-3);

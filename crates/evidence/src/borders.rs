@@ -43,8 +43,8 @@ pub fn judge(suite: &str, scope: Scope, findings: &mut Findings) {
     let has_border = |map: &Map| kept.keys().any(|(title, ..)| *title == line(&map.title));
     let bare: Vec<&Map> = findings.maps.iter().filter(|map| !has_border(map)).collect();
     findings.gates.push(Gate::at_most("maps without a kept border", bare.len() as f64, 0.0));
-    let said = bare.iter().map(|map| format!("NO BORDER kept: {} (validate --keep-borders keeps it)", map.title));
-    findings.regressions.extend(said.collect::<Vec<_>>());
+    let lines = bare.iter().map(|map| format!("NO BORDER kept: {} (validate --keep-borders keeps it)", map.title));
+    findings.regressions.extend(lines.collect::<Vec<_>>());
 }
 
 /// Writes a suite's boundary file into the sources.

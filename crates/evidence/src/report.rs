@@ -80,9 +80,9 @@ pub fn slugs(suite: &Suite, scope: Scope) -> Vec<String> {
 fn commit() -> String {
     let describe = ["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty", "--abbrev=12"];
     let out = std::process::Command::new("git").args(describe).output();
-    let said =
+    let described =
         out.ok().filter(|out| out.status.success()).map(|out| String::from_utf8_lossy(&out.stdout).trim().to_string());
-    said.unwrap_or_else(|| "unknown".into())
+    described.unwrap_or_else(|| "unknown".into())
 }
 
 fn machine() -> BTreeMap<String, String> {
@@ -94,8 +94,11 @@ fn machine() -> BTreeMap<String, String> {
         ("cpu", cpu.unwrap_or("unknown").to_string()),
         ("cores", cores.to_string()),
         ("caches", caches()),
-        ("frequency", said(&format!("{CPU}/cpufreq/scaling_governor")).unwrap_or("not said by the system".into())),
-        ("memory", said("/proc/meminfo").map_or("unknown".into(), |text| text.lines().next().map_or("", total).into())),
+        ("frequency", content(&format!("{CPU}/cpufreq/scaling_governor")).unwrap_or("not said by the system".into())),
+        (
+            "memory",
+            content("/proc/meminfo").map_or("unknown".into(), |text| text.lines().next().map_or("", total).into()),
+        ),
         ("system", format!("{} {}", std::env::consts::OS, std::env::consts::ARCH)),
         ("profile", if cfg!(debug_assertions) { "dev" } else { "release" }.to_string()),
     ];
@@ -105,7 +108,7 @@ fn machine() -> BTreeMap<String, String> {
 /// Folder in which Linux describes the first core.
 const CPU: &str = "/sys/devices/system/cpu/cpu0";
 
-fn said(file: &str) -> Option<String> {
+fn content(file: &str) -> Option<String> {
     std::fs::read_to_string(file).ok().map(|text| text.trim().to_string())
 }
 
@@ -116,7 +119,7 @@ fn total(line: &str) -> &str {
 /// Levels and sizes of the first core's caches.
 fn caches() -> String {
     let of = |index: usize| {
-        let word = |what: &str| said(&format!("{CPU}/cache/index{index}/{what}"));
+        let word = |what: &str| content(&format!("{CPU}/cache/index{index}/{what}"));
         Some(format!("L{} {} {}", word("level")?, word("type")?.to_lowercase(), word("size")?))
     };
     let all: Vec<String> = (0..8).map_while(of).collect();

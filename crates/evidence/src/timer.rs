@@ -107,8 +107,8 @@ impl Control {
             let all = (0..SUM).fold(call as u32, |sum, n| std::hint::black_box(sum.wrapping_mul(31).wrapping_add(n)));
             std::hint::black_box(all);
         });
-        let said = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-        let load = said.split_whitespace().next().and_then(|word| word.parse().ok()).unwrap_or(0.0);
+        let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        let load = text.split_whitespace().next().and_then(|word| word.parse().ok()).unwrap_or(0.0);
         let [empty_p99_us, sum_p50_us] = [empty.quantile(0.99), sum.quantile(0.5)];
         Self { empty_p99_us, sum_p50_us, sum_p99_us: sum.quantile(0.99), load }
     }

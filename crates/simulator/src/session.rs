@@ -230,8 +230,8 @@ impl Session {
         let mut album = Album::default();
         let devices = device.map(|first| Devices { first, second: second_device });
         let run = Run { stages, start, recorder, share, scene, stop: &stop };
-        let outcome = self.loops(run, devices, |eyes| {
-            album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
+        let outcome = self.loops(run, devices, |inputs| {
+            album = self.picture(inputs, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
         let ended = watching.and_then(|watching| watching.ended());
         ended.iter().for_each(|text| tracing::info!("{text}"));
@@ -435,27 +435,27 @@ impl Session {
 
     fn picture(
         &self,
-        mut eyes: RenderInputs,
+        mut inputs: RenderInputs,
         graphics: &mut Result<Graphics, NoPicture>,
         pointer: Option<mouse::MouseHandle>,
         company: PeerSession,
         stop: &Stop,
     ) -> Album {
         let Some(painter) = graphics.as_mut().ok().and_then(|g| g.painter.take()) else {
-            picture::wait(eyes, stop);
+            picture::wait(inputs, stop);
             return Album::default();
         };
         let Some(stage) = &self.place.window else {
             let folder = self.out.join("frames");
-            return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
+            return picture::draw(inputs, painter, &self.setup, self.options.frames_per_second, &folder, stop);
         };
         let opened = self.opened(stage);
-        match (eyes.film.take(), &self.recording) {
+        match (inputs.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
                 let until_s = self.options.duration.unwrap_or(f64::INFINITY);
-                player::show(*eyes.view.latest().0, film, painter, &opened, recording, until_s, stop)
+                player::show(*inputs.view.latest().0, film, painter, &opened, recording, until_s, stop)
             }
-            _ => window::show(eyes, painter, &opened, pointer, company, stop),
+            _ => window::show(inputs, painter, &opened, pointer, company, stop),
         }
     }
 

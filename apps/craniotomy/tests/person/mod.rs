@@ -39,14 +39,14 @@ impl Person {
         fs::create_dir_all(home.join("config")).unwrap();
         fs::write(home.join("config/settings.json"), settings).unwrap();
         let file = std::env::var_os("TREPAN_PERSON_PROGRAM").unwrap_or(env!("CARGO_BIN_EXE_craniotomy").into());
-        let said = fs::File::create(home.join("said")).unwrap();
+        let log = fs::File::create(home.join("said")).unwrap();
         let program = Command::new(file)
             .env("DISPLAY", &display)
             .env("TREPAN_CONFIG", home.join("config"))
             .env("TREPAN_SESSIONS", home.join("sessions"))
             .env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"))
             .stdout(Stdio::null())
-            .stderr(said)
+            .stderr(log)
             .spawn()
             .unwrap();
         let person = Self { screen, program, display, home: home.into() };
@@ -178,7 +178,7 @@ impl Person {
     }
 
     /// What the program wrote on its console.
-    pub fn said(&self) -> String {
+    pub fn log(&self) -> String {
         fs::read_to_string(self.home.join("said")).unwrap_or_default()
     }
 

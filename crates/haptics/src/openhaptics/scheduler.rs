@@ -29,7 +29,7 @@ pub(super) fn add<T>(
 ) -> Result<T, DeviceError> {
     let mut schedulers = SCHEDULERS.lock().unwrap_or_else(PoisonError::into_inner);
     let mut servos = rest(hd, library, &mut schedulers);
-    let (servo, said) = match open() {
+    let (servo, outcome) = match open() {
         Ok(opened) => opened,
         Err(error) => {
             go_on(hd, library, servos, &mut schedulers);
@@ -43,7 +43,7 @@ pub(super) fn add<T>(
         without(hd, library, device, &mut schedulers);
         return Err(words);
     }
-    Ok(said)
+    Ok(outcome)
 }
 
 /// Removes a device and continues to serve the others.

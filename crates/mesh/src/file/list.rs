@@ -145,11 +145,11 @@ mod tests {
             write(&path, &mesh).or_else(|_| write_surface(&path, &surface)).unwrap();
             let (ras, notes) = read(&path);
             assert!(notes.is_empty(), "{name}: {notes:?}");
-            let said: [&[u8]; 2] =
+            let spaces: [&[u8]; 2] =
                 if name == "mesh.vtu" { [b"82 65 83 0", b"76 80 83 0"] } else { [b"SPACE=RAS", b"SPACE=LPS"] };
             let bytes = std::fs::read(&path).unwrap();
-            let at = bytes.windows(said[0].len()).position(|w| w == said[0]).expect("it says its space");
-            std::fs::write(&path, [&bytes[..at], said[1], &bytes[at + said[0].len()..]].concat()).unwrap();
+            let at = bytes.windows(spaces[0].len()).position(|w| w == spaces[0]).expect("it says its space");
+            std::fs::write(&path, [&bytes[..at], spaces[1], &bytes[at + spaces[0].len()..]].concat()).unwrap();
             let turned: Vec<Vec3> = ras.iter().map(|p| Vec3::new(-p.x, -p.y, p.z)).collect();
             assert_eq!(read(&path), (turned, vec![Note::Lps]), "{name}");
         }

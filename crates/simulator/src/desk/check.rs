@@ -560,12 +560,12 @@ mod tests {
     fn a_line_drawn_on_the_head_is_the_flap_and_a_scribble_is_not() {
         let mut check = Check::of(ball(), "c".into(), (None, &[]), Err(GpuError::NoAdapter)).unwrap();
         let draw = |check: &mut Check, way: &[[f32; 2]]| {
-            let mut said = None;
+            let mut outcome = None;
             for (n, at) in way.iter().enumerate() {
                 let (begins, ends) = (n == 0, n + 1 == way.len());
-                said = check.drag(Drag { at: *at, left: true, begins, ends, ..Drag::default() }).unwrap();
+                outcome = check.drag(Drag { at: *at, left: true, begins, ends, ..Drag::default() }).unwrap();
             }
-            said
+            outcome
         };
         let place = |turn: f32, wide: f32| [0.5 + wide * turn.cos(), 0.5 + wide * turn.sin()];
         let ring: Vec<[f32; 2]> = (0..40).map(|n| place(n as f32 * 0.157, 0.06)).collect();

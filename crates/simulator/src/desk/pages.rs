@@ -400,8 +400,8 @@ mod tests {
     #[test]
     fn an_error_names_the_control_and_not_the_flag() {
         let text = "the MRI does not lie in the CT's space: give --register, --labels PATH or --isovalue-hu 700";
-        let said = by_controls(text);
-        assert!(!said.contains("--") && said.contains("\"register\", \"Brain labels...\""), "{said}");
+        let controls = by_controls(text);
+        assert!(!controls.contains("--") && controls.contains("\"register\", \"Brain labels...\""), "{controls}");
     }
 
     #[test]

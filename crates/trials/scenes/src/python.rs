@@ -29,19 +29,20 @@ impl Workshop {
         std::fs::write(folder.path().join("script.py"), script)?;
         let given: PathBuf = std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into()).into();
         let imports = packages.iter().map(|(import, _)| format!("import {import}\n")).collect::<String>();
-        let python = match said(Command::new(&given).args(["-c", &imports])) {
+        let python = match output_of(Command::new(&given).args(["-c", &imports])) {
             Ok(_) => given,
             Err(_) => {
                 let environment = folder.path().join("environment");
-                said(Command::new(given).args(["-m", "venv"]).arg(&environment))?;
+                output_of(Command::new(given).args(["-m", "venv"]).arg(&environment))?;
                 let python = environment.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
                 let mut install = Command::new(&python);
                 install.args(["-m", "pip", "install", "--quiet", "--only-binary", ":all:"]);
-                said(install.args(packages.iter().map(|(_, package)| package)))?;
+                output_of(install.args(packages.iter().map(|(_, package)| package)))?;
                 python
             }
         };
-        let list = said(Command::new(&python).args(["-m", "pip", "list", "--format", "freeze"])).unwrap_or_default();
+        let list =
+            output_of(Command::new(&python).args(["-m", "pip", "list", "--format", "freeze"])).unwrap_or_default();
         let named = |line: &&str| packages.iter().any(|(_, package)| line.starts_with(&format!("{package}==")));
         let versions = list.lines().filter(named).collect::<Vec<_>>().join(", ");
         println!("  {versions}");
@@ -55,12 +56,12 @@ impl Workshop {
 
     /// Returns the script's output, or the last line of its error text.
     pub fn run(&self, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Result<String> {
-        said(Command::new(&self.python).arg(self.at("script.py")).args(arguments).current_dir(self.folder.path()))
+        output_of(Command::new(&self.python).arg(self.at("script.py")).args(arguments).current_dir(self.folder.path()))
     }
 }
 
 /// Returns a program's output, or the last line of its error text.
-fn said(command: &mut Command) -> Result<String> {
+fn output_of(command: &mut Command) -> Result<String> {
     let program = command.get_program().to_string_lossy().into_owned();
     let out = command.output().with_context(|| program.clone())?;
     if out.status.success() {

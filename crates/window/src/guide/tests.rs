@@ -132,16 +132,16 @@ fn a_held_drill_stops_where_the_bone_is_through_and_goes_on_with_a_new_press() {
         }
         stops.push((bench.guide.through(), 3.0 - bench.tip.translation.z));
     }
-    let (said, deep): (Vec<_>, Vec<_>) = stops.into_iter().unzip();
+    let (texts, deep): (Vec<_>, Vec<_>) = stops.into_iter().unzip();
     assert!(
-        said[0].is_some_and(|text| text.starts_with("through")) && (5.9..6.6).contains(&deep[0]),
-        "{said:?} {deep:?}"
+        texts[0].is_some_and(|text| text.starts_with("through")) && (5.9..6.6).contains(&deep[0]),
+        "{texts:?} {deep:?}"
     );
     assert!(
-        said[2].is_some_and(|text| text.starts_with("the hole")) && (6.6..9.6).contains(&deep[2]),
-        "{said:?} {deep:?}"
+        texts[2].is_some_and(|text| text.starts_with("the hole")) && (6.6..9.6).contains(&deep[2]),
+        "{texts:?} {deep:?}"
     );
-    assert!(said[4].is_none() && deep[1] < 0.0, "{said:?} {deep:?}");
+    assert!(texts[4].is_none() && deep[1] < 0.0, "{texts:?} {deep:?}");
     assert!((deep[4] - 7.5).abs() < 0.1, "a third press ends at the inner table: {deep:?}");
 }
 

@@ -59,10 +59,10 @@ fn strokes(method: &Method, scope: Scope) -> Row {
     let normals = directions(scope.pick(6, 12));
     let few = method.descriptor().is_oracle;
     let orientations = if few { 1 } else { normals.len() };
-    let (mut said, mut left, mut times) = (0.0f64, 0.0f64, Vec::new());
+    let (mut reported, mut left, mut times) = (0.0f64, 0.0f64, Vec::new());
     for normal in &normals[..orientations] {
         let found = stroke(method, *normal, scope.pick(POINTS[0], POINTS[1]), &mut times);
-        said = worse(said, found.0 / swept_mm3() - 1.0);
+        reported = worse(reported, found.0 / swept_mm3() - 1.0);
         left = worse(left, found.1 / swept_mm3() - 1.0);
     }
     let times = Samples::from(times);
@@ -73,7 +73,7 @@ fn strokes(method: &Method, scope: Scope) -> Row {
         .with("orientations", orientations)
         .metric("tick_p50_us", times.quantile(0.5))
         .metric("tick_p99_us", times.quantile(0.99))
-        .metric("removed_error_percent", 100.0 * said.abs())
+        .metric("removed_error_percent", 100.0 * reported.abs())
         .metric("hole_error_percent", 100.0 * left.abs())
 }
 
@@ -106,7 +106,7 @@ fn stroke(method: &Method, normal: Vec3, points: i32, times: &mut Vec<f64>) -> (
     let bone = voxels(EDGE, VOXEL_MM, |p| p.dot(normal.as_dvec3()));
     let before = volume_mm3(&bone, points);
     let mut contact = method.with_removal(RemovalLaw::CONSTANT_ENERGY).build(&Tool::burr(R as f32));
-    let (across, mut out, mut said) = (normal.any_orthonormal_vector(), RigidStep::default(), 0.0);
+    let (across, mut out, mut reported) = (normal.any_orthonormal_vector(), RigidStep::default(), 0.0);
     contact.reset(held(normal * R as f32, normal).world_from_tool);
     let way = (0..TICKS).flat_map(|tick| {
         let rests = tick == TICKS / 3 || tick == TICKS - 1;
@@ -119,9 +119,9 @@ fn stroke(method: &Method, normal: Vec3, points: i32, times: &mut Vec<f64>) -> (
         let start = Instant::now();
         contact.step(&bone, &held(tip, normal), true, 10.0, &mut out);
         times.push(start.elapsed().as_secs_f64() * 1e6);
-        said += f64::from(out.removed_mm3);
+        reported += f64::from(out.removed_mm3);
     }
-    (said, before - volume_mm3(&bone, points))
+    (reported, before - volume_mm3(&bone, points))
 }
 
 /// Volume where the density reaches the isovalue and nothing was cut, mm³.
@@ -238,8 +238,11 @@ mod tests {
         let ball = voxels(EDGE, VOXEL_MM, |p| p.length() - 5.0);
         let truth = 4.0 / 3.0 * PI * 125.0;
         assert!((volume_mm3(&ball, 4) / truth - 1.0).abs() < 0.005, "{} {truth}", volume_mm3(&ball, 4));
-        let (said, left) = stroke(&Method::RECOMMENDED, Vec3::new(0.36, 0.48, 0.8), 4, &mut Vec::new());
-        assert!((said / swept_mm3() - 1.0).abs() < 0.02 && (left / swept_mm3() - 1.0).abs() < 0.02, "{said} {left}");
+        let (reported, left) = stroke(&Method::RECOMMENDED, Vec3::new(0.36, 0.48, 0.8), 4, &mut Vec::new());
+        assert!(
+            (reported / swept_mm3() - 1.0).abs() < 0.02 && (left / swept_mm3() - 1.0).abs() < 0.02,
+            "{reported} {left}"
+        );
     }
 
     /// The border: the thesis's law doubles at twice the rate, the recommended one does not know

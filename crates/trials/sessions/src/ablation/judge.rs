@@ -241,9 +241,9 @@ mod tests {
         ]);
         assert!(found.gates.iter().all(|gate| !gate.breaks()));
         assert_eq!(found.gates.iter().filter(|gate| gate.known_gap).count(), 1);
-        let said = "element=locking-free changes more than the tolerance: force on tissue by 0.060 N (0.050 allowed). \
+        let line = "element=locking-free changes more than the tolerance: force on tissue by 0.060 N (0.050 allowed). \
                     It costs +0.100 cores (+20 %) and +2.0 MB.";
-        assert_eq!(found.conclusions, [said, "Within every tolerance: quiet=on."]);
+        assert_eq!(found.conclusions, [line, "Within every tolerance: quiet=on."]);
         assert_eq!((found.charts[0].marks.len(), found.tables[0].rows.len()), (2, 2));
         let broken = |name: &str, metric: &str| {
             let found = judged(vec![row(name, "model").metric(metric, 0.0)]);

@@ -27,7 +27,7 @@ struct Did {
     cost: f64,
     in_time: bool,
     /// Whether it said that it would meet the tolerance.
-    said: bool,
+    claims_met: bool,
 }
 
 impl Did {
@@ -74,7 +74,7 @@ fn scenes(rows: &[Row]) -> BTreeMap<String, Scene> {
             error: metric("error_over_tolerance"),
             cost: metric("cost_cores"),
             in_time: metric("in_time_count") > 0.5,
-            said: metric("says_met_count") > 0.5,
+            claims_met: metric("says_met_count") > 0.5,
         };
         let scene = scenes.entry(format!("{}, {name}", row.part)).or_default();
         scene.insert((kind.into(), row.method.clone()), did);
@@ -135,14 +135,15 @@ fn gates(scenes: &BTreeMap<String, Scene>, findings: &mut Findings) {
     // Tolerances that no choice meets, and what the plan says of its own.
     let hopeless = |kind: &&str| {
         let of = |scene: &Scene| did(scene, kind, "cheapest").is_none().then(|| did(scene, kind, "auto")).flatten();
-        scenes.values().filter_map(of).map(|auto| auto.said).collect::<Vec<_>>()
+        scenes.values().filter_map(of).map(|auto| auto.claims_met).collect::<Vec<_>>()
     };
     // What the plan says that its choices meet, and whether they do.
     let each = scenes.values().flat_map(|scene| KINDS.iter().filter_map(|kind| did(scene, kind, "auto")));
-    let promised: Vec<bool> = each.filter(|auto| auto.said).map(|auto| auto.met()).collect();
+    let promised: Vec<bool> = each.filter(|auto| auto.claims_met).map(|auto| auto.met()).collect();
     let kept = 100.0 * promised.iter().filter(|met| **met).count() as f64 / promised.len().max(1) as f64;
-    let said: Vec<bool> = KINDS.iter().flat_map(hopeless).collect();
-    let silent = 100.0 * said.iter().filter(|said| **said).count() as f64 / said.len().max(1) as f64;
+    let claims_met: Vec<bool> = KINDS.iter().flat_map(hopeless).collect();
+    let silent =
+        100.0 * claims_met.iter().filter(|claims_met| **claims_met).count() as f64 / claims_met.len().max(1) as f64;
     let worst = scenes.values().flat_map(auto).map(|did| did.error).fold(0.0, f64::max);
     let summary = |metric: &str| {
         let row = findings.rows.iter().rev().find(|row| row.scene == "all scenes" && row.method == "auto");

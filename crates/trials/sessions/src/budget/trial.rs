@@ -99,9 +99,9 @@ fn note(name: &str, situation: &Situation, rows: &Rows, own: &CaseErrors, found:
         let over = error / scene.force_error_n;
         Judged { what: row.what, error, force: None, over, cost: priced.cost, in_time: priced.in_time }
     });
-    let said =
-        Said::of(&bone, bone.error / scene.force_error_n, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
-    of("bone", scene.force_error_n, scene.bone_features()).note(all.collect(), said, |setup| setup.bone, findings);
+    let claim =
+        Claim::of(&bone, bone.error / scene.force_error_n, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
+    of("bone", scene.force_error_n, scene.bone_features()).note(all.collect(), claim, |setup| setup.bone, findings);
     let all = rows.tissue.iter().zip(in_tissue).map(|(row, found)| {
         let priced = planned(Alone { tissue: *row, ..chosen }).tissue.expect("there is tissue");
         let (error, force) = (found.error_mm, Some(found.force));
@@ -110,8 +110,8 @@ fn note(name: &str, situation: &Situation, rows: &Rows, own: &CaseErrors, found:
     });
     let features = scene.tissue_features();
     let over = tissue_over(scene, tissue.error, tissue.force);
-    let said = Said::of(&tissue, over, &rows.tissue, &looked_at.tissue, |row| row.error.at_most(&features));
-    of("tissue", scene.displacement_mm, features).note(all.collect(), said, |setup| setup.tissue, findings);
+    let claim = Claim::of(&tissue, over, &rows.tissue, &looked_at.tissue, |row| row.error.at_most(&features));
+    of("tissue", scene.displacement_mm, features).note(all.collect(), claim, |setup| setup.tissue, findings);
     let all = rows.picture.iter().zip(seen).map(|(row, error)| {
         let priced = planned(Alone { picture: *row, ..chosen }).picture;
         let over = error / scene.picture_error_percent;
@@ -119,8 +119,8 @@ fn note(name: &str, situation: &Situation, rows: &Rows, own: &CaseErrors, found:
     });
     let features = scene.picture_features();
     let over = picture.error / scene.picture_error_percent;
-    let said = Said::of(&picture, over, &rows.picture, &looked_at.picture, |row| row.error.at_most(&features));
-    of("picture", scene.picture_error_percent, features).note(all.collect(), said, |setup| setup.picture, findings);
+    let claim = Claim::of(&picture, over, &rows.picture, &looked_at.picture, |row| row.error.at_most(&features));
+    of("picture", scene.picture_error_percent, features).note(all.collect(), claim, |setup| setup.picture, findings);
 }
 
 /// One row of each kind.
@@ -165,8 +165,8 @@ struct Of {
     features: [f64; FEATURES],
 }
 
-/// What the plan said, and what it believed of every choice; `None` of those that it left out.
-struct Said<T> {
+/// A plan's claim, and what it believed of every choice; `None` of those that it left out.
+struct Claim<T> {
     what: T,
     /// The worst of its bounds over their tolerances.
     over: f64,
@@ -176,7 +176,7 @@ struct Said<T> {
     believed_force: Vec<Option<f64>>,
 }
 
-impl<T: Kind + PartialEq> Said<T> {
+impl<T: Kind + PartialEq> Claim<T> {
     fn of(
         choice: &Choice<T>,
         over: f64,
@@ -199,14 +199,14 @@ impl Of {
     fn note<T: Kind + Display + PartialEq>(
         &self,
         all: Vec<Judged<T>>,
-        said: Said<T>,
+        claim: Claim<T>,
         of_setup: impl Fn(Setup) -> T,
         findings: &mut Findings,
     ) {
         let of = |what: T| all.iter().find(|n| n.what == what);
         let meeting = all.iter().filter(|n| n.over <= 1.0 && n.in_time);
         let cheapest = meeting.min_by(|a, b| a.cost.total_cmp(&b.cost));
-        let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(said.what, &of_setup))));
+        let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(claim.what, &of_setup))));
         for (name, taken) in chosen.chain([("cheapest", cheapest)]) {
             let Some(taken) = taken else { continue };
             findings.rows.push(self.row(name, taken));
@@ -216,14 +216,14 @@ impl Of {
             auto.config.insert("errors".into(), all.iter().map(|n| four(n.error)).collect::<Vec<_>>().into());
             auto.config.insert("features".into(), self.features.map(four).to_vec().into());
             let believed = |of: &[Option<f64>]| of.iter().map(|e| e.map(four)).collect::<Vec<_>>();
-            auto.config.insert("believed".into(), believed(&said.believed).into());
+            auto.config.insert("believed".into(), believed(&claim.believed).into());
             let forces: Vec<f64> = all.iter().filter_map(|n| Some(four(n.force?.error_n))).collect();
             if !forces.is_empty() {
                 auto.config.insert("force_errors".into(), forces.into());
-                auto.config.insert("believed_forces".into(), believed(&said.believed_force).into());
+                auto.config.insert("believed_forces".into(), believed(&claim.believed_force).into());
             }
-            auto.metrics.insert("bound_over_tolerance".into(), said.over);
-            auto.metrics.insert("says_met_count".into(), f64::from(u8::from(said.meets)));
+            auto.metrics.insert("bound_over_tolerance".into(), claim.over);
+            auto.metrics.insert("says_met_count".into(), f64::from(u8::from(claim.meets)));
         }
     }
 
