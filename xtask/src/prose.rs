@@ -16,10 +16,14 @@ const PARTICIPLES: [&str; 24] = [
     "Opened", "Paid", "Ran", "Seen", "Shown", "Stored", "Taken", "Taught", "Told", "Worn", "Wanted",
 ];
 
+/// Participles that variables and fields were named after.
+const OF_VARIABLES: [&str; 5] = ["told", "said", "heard", "taught", "flown"];
+
 /// Faults of a source file in Rust or WGSL, each with its line.
 pub fn in_source(text: &str) -> Vec<String> {
     let mut faults = retired(text);
-    faults.extend(text.lines().enumerate().filter_map(|(at, line)| participle(at, line)));
+    faults
+        .extend(text.lines().enumerate().filter_map(|(at, line)| participle(at, line).or_else(|| variable(at, line))));
     let comments = text.lines().enumerate().filter(|(_, line)| line.trim_start().starts_with("//"));
     faults.extend(comments.filter_map(|(at, line)| too_wide(at, line)));
     faults.extend(first_sentences(text));
@@ -49,6 +53,18 @@ fn participle(at: usize, line: &str) -> Option<String> {
     });
     let name = name?.1.split(|c: char| !c.is_alphanumeric()).next()?;
     PARTICIPLES.contains(&name).then(|| format!("{}: `{name}` is a participle, name the thing", at + 1))
+}
+
+/// A variable, field or function that is named by a participle alone.
+fn variable(at: usize, line: &str) -> Option<String> {
+    let code = line.trim_start();
+    let code = ["pub fn ", "fn ", "let mut ", "let ", "pub "]
+        .iter()
+        .find_map(|start| code.strip_prefix(start))
+        .unwrap_or(code);
+    let (name, rest) = code.split_at(code.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(code.len()));
+    let is_named = [": ", " = ", "("].iter().any(|next| rest.starts_with(next));
+    (is_named && OF_VARIABLES.contains(&name)).then(|| format!("{}: `{name}` is a participle, name the thing", at + 1))
 }
 
 /// A line that is too wide, unless it is one long word such as an address.
@@ -136,11 +152,15 @@ mod tests {
     }
 
     #[test]
-    fn a_type_that_is_named_by_a_participle_is_found() {
+    fn a_type_or_variable_that_is_named_by_a_participle_is_found() {
         for line in ["pub struct Held {", "    enum Shown<'a> {", "pub(crate) type Asked = u8;"] {
             assert_eq!(in_source(line).len(), 1, "{line}");
         }
-        for line in ["struct HeldTool;", "let x = Kept;", "    Drawn,", "impl Held {"] {
+        for line in ["let told = 1;", "    let mut said: u8;", "    pub heard: u32,", "fn taught(a: u8) {"] {
+            assert_eq!(in_source(line).len(), 1, "{line}");
+        }
+        for line in ["struct HeldTool;", "it.told()", "let told_ms = 1;", "let x = Kept;", "    Drawn,", "impl Held {"]
+        {
             assert!(in_source(line).is_empty(), "{line}");
         }
     }

@@ -68,7 +68,7 @@ fn a_person_drills_a_burr_hole_by_mouse_alone() {
     person.points(MIDDLE);
     person.rests(2.0);
     person.does("mousedown 1");
-    person.waits_for("the breakthrough", || person.heard("came through") == 1);
+    person.waits_for("the breakthrough", || person.count_in_log("came through") == 1);
     eprintln!("through {:.0} s after the click on the start page", began.elapsed().as_secs_f64());
     // She does not notice.
     person.rests(4.0);
@@ -185,11 +185,11 @@ fn a_person_cuts_and_lifts_a_flap_by_mouse_alone() {
     let deepest_mm = cutting.fold(f32::MAX, f32::min);
     assert!(deepest_mm > 0.0, "the craniotome's cutter sank {} mm into the brain", -deepest_mm);
     person.does("mouseup 1");
-    person.waits_for("the free flap", || person.heard("the flap is free") == 1);
+    person.waits_for("the free flap", || person.count_in_log("the flap is free") == 1);
     person.clicks(DRAW_BACK);
     person.rests(1.0);
     person.clicks(LIFT);
-    person.waits_for("the lifted flap", || person.heard("the flap is lifted") == 1);
+    person.waits_for("the lifted flap", || person.count_in_log("the flap is lifted") == 1);
     let summary = person.ends(1);
     eprintln!("plan {}", summary["plan"]);
     assert!(summary["plan"]["dice"].as_f64().unwrap() > 0.8, "{}", summary["plan"]);

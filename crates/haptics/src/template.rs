@@ -89,7 +89,7 @@ pub struct Template {
     socket: Option<UdpSocket>,
     workspace: Workspace,
     counter: u32,
-    heard: u32,
+    last_counter: u32,
     silent_ticks: u32,
     last: ToolState,
     ramp: Ramp,
@@ -104,7 +104,7 @@ impl Template {
             socket: Some(connected(config.address).map_err(|fault| not_opened(config.address, &fault))?),
             workspace: config.workspace,
             counter: 0,
-            heard: 0,
+            last_counter: 0,
             silent_ticks: 0,
             last: config.workspace.world(&ToolState::at(Pose::IDENTITY)),
             ramp: Ramp::new(watch.clone()),
@@ -125,8 +125,8 @@ impl Template {
             let mut bytes = [0; 64];
             match socket.recv(&mut bytes) {
                 Ok(count) => match State::parse(&bytes[..count]) {
-                    Some(state) if state.counter > self.heard => {
-                        self.heard = state.counter;
+                    Some(state) if state.counter > self.last_counter => {
+                        self.last_counter = state.counter;
                         newest = Some(state);
                     }
                     Some(_) => {}

@@ -114,7 +114,7 @@ impl Session {
         mut place: Place,
     ) -> Result<Self, SessionError> {
         options.check()?;
-        let (lesson, options) = taught(program, options)?;
+        let (lesson, options) = lesson_of(program, options)?;
         let windowed = place.window.is_some();
         check_outputs(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
@@ -372,9 +372,9 @@ impl Session {
     ) -> Result<(PeerSession, [OptionalDevice; 2]), SessionError> {
         let mut company = PeerSession::default();
         if let Some([first, second, window]) = asked {
-            let taught = |hand: OptionalDevice, by| hand.map(|device| Box::new(TeacherButtons::new(device, by)) as _);
+            let wrap = |hand: OptionalDevice, by| hand.map(|device| Box::new(TeacherButtons::new(device, by)) as _);
             let [one, other] = hands;
-            hands = [taught(one, first), taught(other, second)];
+            hands = [wrap(one, first), wrap(other, second)];
             company.asked = Some(window);
         }
         if let Some(name) = self.options.watch.as_deref().filter(|_| self.windowed()) {
@@ -574,7 +574,7 @@ fn watched(name: &str, case: &Identity, progress: &Progress) -> Result<Recording
 }
 
 /// Finds the lesson that the options name, and takes its flap and tool.
-fn taught(program: Program, options: Options) -> Result<(Option<Lesson>, Options), SessionError> {
+fn lesson_of(program: Program, options: Options) -> Result<(Option<Lesson>, Options), SessionError> {
     let Some(name) = &options.lesson else { return Ok((None, options)) };
     let all = Lesson::of(program, Lesson::folder().as_deref());
     let names = || all.iter().map(|lesson| lesson.name.as_str()).collect::<Vec<_>>().join(", ");

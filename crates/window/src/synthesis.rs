@@ -39,7 +39,7 @@ pub(crate) struct Synthesis {
     tone: f32,
     alarm_s: f32,
     /// Smoothed spindle speed, load and alarm loudness.
-    heard: [f32; 3],
+    levels: [f32; 3],
 }
 
 impl Synthesis {
@@ -49,10 +49,10 @@ impl Synthesis {
         let sound = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
         let aims = [sound(wanted.spindle), sound(wanted.load), f32::from(u8::from(wanted.alarm))];
         let share = (dt_s / FOLLOW_S).min(1.0);
-        for (heard, aim) in self.heard.iter_mut().zip(aims) {
-            *heard += share * (aim - *heard);
+        for (level, aim) in self.levels.iter_mut().zip(aims) {
+            *level += share * (aim - *level);
         }
-        let [spindle, load, alarm] = self.heard;
+        let [spindle, load, alarm] = self.levels;
         self.alarm_s = if wanted.alarm || alarm > 1e-3 { (self.alarm_s + dt_s) % (2.0 * TONE_S) } else { 0.0 };
         let tone_hz = ALARM_HZ[usize::from(self.alarm_s >= TONE_S)];
         self.hum = (self.hum + dt_s * HUM_HZ * spindle).fract();
@@ -91,17 +91,17 @@ mod tests {
     #[test]
     fn the_pitch_is_the_spindles_and_falls_with_it() {
         for spindle in [1.0, 0.7, 0.4] {
-            let heard = pitch_hz(&samples(Sound { spindle, load: 0.3, alarm: false }, 1.0));
-            assert!((heard - HUM_HZ * spindle).abs() <= 2.0, "{heard} at {spindle}");
+            let pitch = pitch_hz(&samples(Sound { spindle, load: 0.3, alarm: false }, 1.0));
+            assert!((pitch - HUM_HZ * spindle).abs() <= 2.0, "{pitch} at {spindle}");
         }
     }
 
     #[test]
     fn load_makes_it_rougher() {
         let peak_to_mean = |load| {
-            let heard = samples(Sound { spindle: 1.0, load, alarm: false }, 0.5);
-            let square = heard.iter().map(|x| x * x).sum::<f32>() / heard.len() as f32;
-            heard.iter().fold(0.0f32, |most, x| most.max(x.abs())) / square.sqrt()
+            let sound = samples(Sound { spindle: 1.0, load, alarm: false }, 0.5);
+            let square = sound.iter().map(|x| x * x).sum::<f32>() / sound.len() as f32;
+            sound.iter().fold(0.0f32, |most, x| most.max(x.abs())) / square.sqrt()
         };
         assert!(peak_to_mean(1.0) < 0.9 * peak_to_mean(0.0), "{} {}", peak_to_mean(1.0), peak_to_mean(0.0));
     }
@@ -109,9 +109,9 @@ mod tests {
     #[test]
     fn the_alarm_has_two_tones_and_ends() {
         let alarm = Sound { alarm: true, ..Sound::default() };
-        let heard = samples(alarm, 1.2);
+        let sound = samples(alarm, 1.2);
         // The last half second contains half of each tone.
-        assert!([880.0, 1320.0].iter().any(|hz| (pitch_hz(&heard) - hz).abs() < 10.0));
+        assert!([880.0, 1320.0].iter().any(|hz| (pitch_hz(&sound) - hz).abs() < 10.0));
         let mut synthesis = Synthesis::default();
         (0..9600).for_each(|_| _ = synthesis.sample(alarm, RATE_HZ));
         let quiet: Vec<f32> = (0..24_000).map(|_| synthesis.sample(Sound::default(), RATE_HZ)).collect();

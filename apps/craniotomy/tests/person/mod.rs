@@ -163,7 +163,7 @@ impl Person {
     }
 
     /// Number of its events whose text contains some words.
-    pub fn heard(&self, words: &str) -> usize {
+    pub fn count_in_log(&self, words: &str) -> usize {
         self.recording().events.iter().filter(|event| event.text.contains(words)).count()
     }
 

@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     /// Distance after flowing for unit time.
-    fn flown(speed: impl Fn(f32) -> f32, from: f32) -> f32 {
+    fn end_of_flow(speed: impl Fn(f32) -> f32, from: f32) -> f32 {
         (0..1000).fold(from, |d, _| d + 1e-3 * speed(d))
     }
 
@@ -201,16 +201,16 @@ mod tests {
         let near = |a: f32, b: f32| assert!((a - b).abs() < 0.05, "{a} instead of {b}");
         for by in [-4.0, -2.0, 1.0, 6.0] {
             let speed = Trapezoid { by, low: -16.0, high: 18.0 };
-            near(flown(|d| speed.of(d), by), 0.0);
-            assert_eq!([-20.0, 20.0].map(|d| flown(|d| speed.of(d), d)), [-20.0, 20.0]);
-            let places: Vec<f32> = (-200..=200).map(|d| flown(|d| speed.of(d), 0.1 * d as f32)).collect();
+            near(end_of_flow(|d| speed.of(d), by), 0.0);
+            assert_eq!([-20.0, 20.0].map(|d| end_of_flow(|d| speed.of(d), d)), [-20.0, 20.0]);
+            let places: Vec<f32> = (-200..=200).map(|d| end_of_flow(|d| speed.of(d), 0.1 * d as f32)).collect();
             assert!(places.is_sorted_by(|a, b| a < b), "moved by {by}");
         }
         for factor in [0.6, 1.6] {
             let speed = thickening(factor);
-            near(flown(|d| speed.of(d), factor * 6.0), 6.0);
-            near(flown(|d| speed.of(d), 50.0), 50.0 - (factor - 1.0) * VAULT_MM);
-            assert_eq!(flown(|d| speed.of(d), -5.0), -5.0);
+            near(end_of_flow(|d| speed.of(d), factor * 6.0), 6.0);
+            near(end_of_flow(|d| speed.of(d), 50.0), 50.0 - (factor - 1.0) * VAULT_MM);
+            assert_eq!(end_of_flow(|d| speed.of(d), -5.0), -5.0);
         }
     }
 }
