@@ -2,6 +2,7 @@
 //! rewrites what can be read.
 
 use crate::case::identity::Identity;
+use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::printable::printable;
 use std::path::Path;
@@ -32,6 +33,8 @@ pub(crate) fn open(program: Program, file: &Path, case: &Identity) -> Result<Rec
         let remedy = "give the --ct and --mri, or the --case, of that one, or none of them for the built-in case";
         return Err(SessionError::Usage(format!("--device: {fault}, this is {}; {remedy}", case.describe())));
     }
+    let unread = |fault| SessionError::Usage(format!("{}: {fault}", file.display()));
+    SessionConfig::of(&recording.header).map_err(unread)?;
     losses.iter().for_each(|losses| tracing::warn!("{}", printable(losses)));
     Ok(recording)
 }
@@ -51,6 +54,7 @@ pub(crate) fn of_watched(name: &str, header: SessionHeader, case: &Identity) -> 
              the --case, of that one, or none of them for the built-in case"
         )));
     }
+    SessionConfig::of(&header).map_err(|fault| SessionError::Usage(format!("--watch {name}: {fault}")))?;
     Ok(Recording { header, ..Recording::default() })
 }
 
@@ -112,4 +116,18 @@ fn describe(recording: &Recording) -> String {
     let seconds = recording.ticks.last().map_or(0.0, |tick| tick.time_ms * 1e-3);
     let header = &recording.header;
     format!("{} of {}, {} ticks, {seconds:.1} s", header.app, header.case, recording.ticks.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_that_is_refused_names_the_session_and_the_entry() {
+        let config = [("operation.flap_mm".to_string(), "wide".to_string())].into();
+        let header = SessionHeader { app: "craniotomy".into(), config, ..SessionHeader::default() };
+        let case = Identity::of(&header);
+        let fault = of_watched("left", header, &case).unwrap_err().to_string();
+        assert!(["--watch left: ", "operation.flap_mm", "wide"].iter().all(|part| fault.contains(part)), "{fault}");
+    }
 }

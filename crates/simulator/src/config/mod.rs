@@ -127,10 +127,18 @@ fn flatten(value: &Value, path: String, out: &mut BTreeMap<String, String>) {
         }
         Value::Null => return,
         Value::String(text) => text.clone(),
-        Value::Number(number) => decimal(number),
-        other => other.to_string(),
+        other => leaf(other),
     };
     out.insert(path, text);
+}
+
+/// JSON of a value without named fields, its numbers as the shortest decimals.
+fn leaf(value: &Value) -> String {
+    match value {
+        Value::Number(number) => decimal(number),
+        Value::Array(values) => format!("[{}]", values.iter().map(leaf).collect::<Vec<_>>().join(",")),
+        other => other.to_string(),
+    }
 }
 
 /// The shortest decimal of a number: 0.1 also where it came from an `f32`.
@@ -190,7 +198,7 @@ mod tests {
             ingredients: Ingredients { friction: number, threads: Some(2), ..Ingredients::of(Quality::Fine) },
             operation: Operation {
                 flap_mm: number,
-                flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]],
+                flap_line: vec![[1.5, -2.0, number], [3.0, 4.0, 5.0]],
                 csf_loss: Some(0.3),
                 forbidden: vec![TissueClass::Tumour, TissueClass::Vessel],
                 opening_needed: false,
@@ -217,6 +225,7 @@ mod tests {
         let of = |path: &str| entries[path].as_str();
         assert_eq!((of("operation.flap_mm"), of("device.scale"), of("sizes.spacing_mm")), ("0.1", "0.7", "0.85"));
         assert_eq!((of("ingredients.friction"), of("why.bone")), ("0.1", "12"));
+        assert_eq!(of("operation.flap_line"), "[[1.5,-2,0.1],[3,4,5]]");
         assert_eq!(of("operation.forbidden"), "[\"tumour\",\"vessel\"]");
         assert_eq!(read(BTreeMap::new()).unwrap(), SessionConfig::default());
         let deep = "a.".repeat(200_000);

@@ -33,8 +33,8 @@ pub fn shift(findings: &mut Findings) -> Result<()> {
             fitted(&shift::LANDMARKS_DURING, at(&shift::TIME_DURING)),
             fitted(&shift::LANDMARKS_END, at(&shift::TIME_END)),
             Comparison::of(&shift::GRAVITY, How::Predicted, sunk.into()).why(
-                "the share of buoyancy that is lost stands at 0.3; the brain sinks further with more, but then no \
-                 rest was found in the time",
+                "the share of buoyancy that is lost stands at 0.3, which fits the landmarks; the brain sinks further \
+                 with more",
             ),
         ]
         .map(|comparison| comparison.row()),
