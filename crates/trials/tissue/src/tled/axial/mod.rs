@@ -369,7 +369,9 @@ fn judge(scene: &Scene, name: &str, mesh: &TetMesh, all: &[Found], findings: &mu
     let edge = edge_mm(mesh);
     let what = format!("{name}, edge of {edge:.1} mm");
     let worst = |of: fn(&Found) -> f64| all.iter().map(of).fold(0.0, f64::max);
-    let (mut over, mut over_moving) = (0.0f64, None::<f64>);
+    // Without a truth nothing is right.
+    let is_known = all.iter().any(|found| found.exact_n.is_some());
+    let (mut over, mut over_moving) = (if is_known { 0.0f64 } else { f64::INFINITY }, None::<f64>);
     for found in all {
         let mut row = Row::new(format!("axial press: {name}"), "tled")
             .with("tets", mesh.tets.len())
