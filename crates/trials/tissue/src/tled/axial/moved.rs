@@ -32,7 +32,7 @@ use trepan_stages::{HapticConfig, HapticStage, Program, TickInput};
 /// Way of a slide before and, where it goes on, behind the middle, mm.
 const SLIDE_MM: f32 = 4.0;
 /// Friction coefficient of the slides to both sides.
-const FRICTION: f32 = 0.1;
+const FRICTION: f64 = 0.1;
 /// Rest of the hand after each move, ms: several of its slowest time constants.
 const HAND_REST_MS: usize = 600;
 /// Time in which the hand waits in air while the force ramps in, ms.
@@ -52,7 +52,7 @@ pub(super) fn parts() -> Vec<Part> {
     let spatula = Scene { tool: Tool::spatula(), ..heavy };
     let pia = heavy.on_pia_arachnoid();
     let smooth = |name, scene: Scene, truth_mm| Scene { name, friction: 0.0, truth_mm, ..scene };
-    let rubbed = |name, scene: Scene| Scene { name, friction: FRICTION, truth_mm: 3, ..scene };
+    let rubbed = |name, scene: Scene| Scene { name, friction: FRICTION as f32, truth_mm: 3, ..scene };
     vec![
         of(smooth("slide of a probe to the middle", heavy, 3), end),
         of(smooth("slide of a spatula to the middle", spatula, 4), end),
@@ -134,7 +134,7 @@ fn mirrored(scene: &Scene, mesh: &TetMesh, findings: &mut Findings) -> Result<()
     let what = format!("{name}, edge of {edge:.1} mm");
     let over_n = apart_n / (0.1 * size_n).max(0.02);
     findings.gates.extend([
-        Gate::at_least(format!("{what}: drag over the normal force"), drag_share, scene.friction.into()),
+        Gate::at_least(format!("{what}: drag over the normal force"), drag_share, FRICTION),
         Gate::at_most(format!("{what}: forces and their mirror image apart, over what is allowed"), over_n, 1.0),
         Gate::at_most(format!("{what}: elements inverted"), inverted, 0.0),
         Gate::at_most(format!("{what}: time skipped, ms"), skipped_ms, 0.0),
