@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates by floor, lowest first.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget", "window", "evidence", "stages"],
+    &["patient"],
     &["simulator"],
     &["craniotomy", "brain", "integrated", "trials-scenes"],
     &["trials-bone", "trials-tissue"],
@@ -84,9 +85,13 @@ fn short(package: &str) -> &str {
     package.strip_prefix("trepan-").unwrap_or(package)
 }
 
-/// The crates of trials are kept to the same as one.
+/// The crates of trials, and those that a session consists of, are kept to the same as one.
 fn group(name: &str) -> &str {
-    if name.starts_with("trials-") { "trials" } else { name }
+    match name {
+        "patient" => "simulator",
+        _ if name.starts_with("trials-") => "trials",
+        _ => name,
+    }
 }
 
 fn floor_of(name: &str) -> Option<usize> {

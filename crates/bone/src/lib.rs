@@ -282,6 +282,18 @@ impl BoneVolume {
         self.hu(voxel) >= self.isovalue
     }
 
+    /// Density over the isovalue at a point, HU: trilinear between voxel centres.
+    pub fn over_isovalue(&self, point: Vec3) -> f32 {
+        let at = self.grid_of(point);
+        let (low, part) = (at.floor().as_ivec3(), at - at.floor());
+        let corner = |n: i32| {
+            let step = IVec3::new(n & 1, n >> 1 & 1, n >> 2);
+            let weight = Vec3::select(step.cmpeq(IVec3::ONE), part, 1.0 - part);
+            weight.element_product() * f32::from(self.hu(low + step))
+        };
+        (0..8).map(corner).sum::<f32>() - f32::from(self.isovalue())
+    }
+
     /// Whether a world point is in bone that was not cut, to the nearest voxel and node.
     #[inline]
     pub fn holds(&self, point: Vec3) -> bool {

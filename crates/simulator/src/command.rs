@@ -2,7 +2,7 @@
 //! code.
 
 use crate::batch;
-use crate::case::choice::{BuiltCase, PlannedCase, build_case, plan_case};
+use crate::choice::{BuiltCase, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
 use crate::constants;
 use crate::desk::{self, Done};

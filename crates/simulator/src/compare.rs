@@ -9,7 +9,6 @@
 //! To check whether two builds give the same forces: replay one recording; its summary compares the
 //! forces bit by bit.
 
-use crate::case::identity::Identity;
 use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::report::chart::{Chart, Curve, over_time};
@@ -21,6 +20,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, TickRecord};
+use trepan_patient::identity::Identity;
 use trepan_stages::score::ScoreKeeper;
 
 /// Reads two recordings and writes `compare.html` to a folder.

@@ -1,6 +1,7 @@
 //! Errors before and after a session, and their exit codes.
 
 use std::path::{Path, PathBuf};
+use trepan_patient::PatientError;
 
 /// Error that keeps a session from starting or from writing its files. Errors that the user can
 /// correct exit with 2, others with 1.
@@ -9,13 +10,13 @@ pub enum SessionError {
     /// Invalid flag or combination of flags.
     #[error("{0}")]
     Usage(String),
-    /// Loading that the user cancelled.
-    #[error("loading was cancelled")]
-    Cancelled,
+    /// A case that cannot be opened, or loading that the user cancelled.
+    #[error(transparent)]
+    Patient(#[from] PatientError),
     /// Unreadable image.
     #[error(transparent)]
     Read(#[from] trepan_volume::ReadError),
-    /// Images from which no case can be built.
+    /// A case that a program cannot use.
     #[error("{0}")]
     Case(String),
     /// Unknown or missing device.
@@ -49,7 +50,7 @@ impl SessionError {
     /// Exit code: 2 for errors that the user can correct, else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Picture(_) | Self::Internal(_) => 1,
+            Self::Picture(_) | Self::Internal(_) | Self::Patient(PatientError::Internal(_)) => 1,
             _ => 2,
         }
     }

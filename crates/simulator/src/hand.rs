@@ -1,6 +1,5 @@
 //! Opens the devices that the options name.
 
-use crate::case::plan::Plan;
 use crate::error::SessionError;
 use crate::options::Options;
 use crate::run::stop::Stop;
@@ -11,6 +10,7 @@ use trepan_haptics::{
     Capabilities, Clutch, DeviceName, HapticDevice, Motion, OpenedDevice, Setting, ThreadedDevice, Watch, Workspace,
     mouse,
 };
+use trepan_patient::Plan;
 use trepan_stages::program::Program;
 
 /// An open device of a hand.

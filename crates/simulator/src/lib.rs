@@ -17,7 +17,7 @@
 //! To use a single method in your own program: use the method's crate.
 
 mod batch;
-mod case;
+mod choice;
 mod command;
 mod compare;
 mod config;
@@ -30,15 +30,11 @@ mod hand;
 mod ingredients;
 mod inspect;
 pub mod measure;
-mod mixture;
 mod models;
 mod operation;
 mod options;
 mod printable;
-mod progress;
-mod recipe;
 mod recordings;
-mod remark;
 mod report;
 mod run;
 mod session;
@@ -46,29 +42,20 @@ mod session_setup;
 mod settings;
 mod show;
 mod solver;
-mod tissue_class;
 mod training;
 mod uncertainty;
 mod whole;
 
-pub use case::Inputs;
-pub use case::anchors::BrainSupport;
-pub use case::cache::Cache;
-pub use case::import::open as open_case;
-pub use case::plan::Plan;
-pub use case::scene::{RestBrain, Scene};
 pub use command::command;
 pub use error::SessionError;
 pub use ingredients::{Effect, Element, Ingredients, Law, Relaxation, SolverDevice, Support};
 pub use ingredients::{Variant, of_quality, realistic, variants};
-pub use mixture::body_of;
 pub use options::Options;
-pub use recipe::Recipe;
 pub use report::plan_comparison::PlanComparison;
 pub use report::summary::Summary;
 pub use run::Stages;
 pub use session::Session;
-pub use tissue_class::{TissueClass, TissueSource};
+pub use trepan_patient::{Inputs, PatientError, TissueSource};
 pub use trepan_stages::{
     CollisionStage, HapticConfig, HapticStage, Hindrance, Limits, Notice, Phase, Program, ScoreKeeper, Settling,
     SkullWall, SoftFrame, SolverFaults, SolverStage, TickInput, ToolSample, Warning, What, dry_weight,

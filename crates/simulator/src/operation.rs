@@ -2,10 +2,10 @@
 //! tick rate. They come from the options, else from the replayed recording, else from defaults.
 
 use crate::options::Options;
-use crate::tissue_class::TissueClass;
 use serde::{Deserialize, Serialize};
 use trepan_haptics::DeviceName;
 use trepan_measurements::{brain_living, support};
+use trepan_patient::TissueClass;
 
 /// Default diameter of the flap that script `flap` cuts, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;

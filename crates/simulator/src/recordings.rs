@@ -1,7 +1,6 @@
 //! `recording check` and `recording repair`: reports what a recording contains and lacks, and
 //! rewrites what can be read.
 
-use crate::case::identity::Identity;
 use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::printable::printable;
@@ -9,6 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recording, repair};
+use trepan_patient::identity::Identity;
 use trepan_stages::program::Program;
 
 /// Describes what a recording lacks, with the remedy if there is one; `None` if it is complete.

@@ -1,10 +1,6 @@
 //! Runs a session from its flags to its files: open with all checks, run, write.
 
-use crate::case::choice;
-use crate::case::identity::Identity;
-use crate::case::plan::Plan;
-use crate::case::scene::Scene;
-use crate::case::{Inputs, anatomy};
+use crate::choice;
 use crate::config::SessionConfig;
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
@@ -13,7 +9,6 @@ use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::printable::printable;
-use crate::progress::Progress;
 use crate::recordings;
 use crate::report::debrief::Debrief;
 use crate::report::drilled::{self, Drilled};
@@ -45,6 +40,11 @@ use trepan_haptics::script::Script;
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse, spacemouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording, SceneWriter};
+use trepan_patient::Plan;
+use trepan_patient::Scene;
+use trepan_patient::identity::Identity;
+use trepan_patient::progress::Progress;
+use trepan_patient::{self as patient, Inputs, PatientError};
 use trepan_render::Camera;
 use trepan_stages::haptic_tick::ToolSample;
 use trepan_stages::program::Program;
@@ -321,7 +321,7 @@ impl Session {
     /// Current skull in the scanner's voxels; in those of the case, with a remark, if the CT is not
     /// available.
     fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> Drilled {
-        let why = match anatomy::scanned(&self.inputs, self.options.patient.ct_series) {
+        let why = match patient::scanned(&self.inputs, self.options.patient.ct_series) {
             Some(Ok(ct)) => return drilled::drilled(ct, whole, bone),
             Some(Err(fault)) => format!("the CT cannot be read again: {fault}"),
             None => "a case folder does not hold the scanner's images".into(),
@@ -569,7 +569,7 @@ impl Session {
 /// Waits for the header of the session that is watched; a recording of nothing else.
 fn watched(name: &str, case: &Identity, progress: &Progress) -> Result<Recording, SessionError> {
     let header = watch::header(name, || progress.is_over());
-    let header = if progress.is_over() { Err(SessionError::Cancelled) } else { header }?;
+    let header = if progress.is_over() { Err(SessionError::Patient(PatientError::Cancelled)) } else { header }?;
     recordings::of_watched(name, header, case)
 }
 

@@ -1,15 +1,10 @@
 //! Setup of a session: patient, plan and models, and the stages built from them.
 
-use crate::case::Case;
-use crate::case::anchors::BrainSupport;
-use crate::case::plan::Plan;
-use crate::case::scene::{RestBrain, Scene};
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
 use crate::ingredients::{Ingredients, Support};
 use crate::models::Models;
 use crate::operation::Operation;
-use crate::remark;
 use crate::report::regions::{Region, regions};
 use crate::run::{self, Stages};
 use crate::solver::{self, SolverInfo};
@@ -20,6 +15,11 @@ use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
 use trepan_measurements::support;
 use trepan_mesh::TetMesh;
+use trepan_patient::Case;
+use trepan_patient::Plan;
+use trepan_patient::anchors::BrainSupport;
+use trepan_patient::remark;
+use trepan_patient::{RestBrain, Scene};
 use trepan_rigid::{Extent, Method};
 use trepan_stages::collision_step::CollisionStage;
 use trepan_stages::haptic_config::{BONE, HapticConfig, TISSUE};

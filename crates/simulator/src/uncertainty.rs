@@ -124,9 +124,9 @@ pub(crate) fn limits() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tissue_class::TissueClass;
     use trepan_contact::NodalContact;
     use trepan_geometry::Vec3;
+    use trepan_patient::TissueClass;
     use trepan_rigid::removal::{Pressed, RemovalLaw};
     use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
     use trepan_stages::haptic_config::TISSUE;

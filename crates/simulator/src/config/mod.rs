@@ -174,8 +174,8 @@ fn fill(value: &mut Value, path: &str, text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tissue_class::TissueClass;
     use trepan_budget::Quality;
+    use trepan_patient::TissueClass;
 
     fn read(config: BTreeMap<String, String>) -> Result<SessionConfig, SessionError> {
         SessionConfig::of(&SessionHeader { config, ..SessionHeader::default() })

@@ -60,8 +60,8 @@ fn value(name: &str, text: &str) -> String {
 mod tests {
     use crate::config::SessionConfig;
     use crate::ingredients::Element;
-    use crate::tissue_class::TissueClass;
     use trepan_link::wire::SessionHeader;
+    use trepan_patient::TissueClass;
 
     #[test]
     fn a_header_of_before_is_read_in_full() {

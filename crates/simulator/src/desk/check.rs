@@ -7,22 +7,22 @@
 //! opening: the line from there to the centre of the head. A drag turns the head, or draws the line
 //! of the flap on it; if the line does not surround the opening, its middle is the opening.
 
-use crate::case::Case;
-use crate::case::opening::eye;
-use crate::case::plan::Plan;
 use crate::desk::action::Action;
 use crate::desk::form::Form;
 use crate::desk::pages::{across_mm, by_controls, images};
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::settings::Source;
-use crate::tissue_class::TissueClass;
 use glam::{DAffine3, DVec3, Vec2};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Site;
+use trepan_patient::Case;
+use trepan_patient::Plan;
+use trepan_patient::TissueClass;
+use trepan_patient::opening::eye;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SceneData, SliceLook, View};
 use trepan_stages::program::Program;
 use trepan_volume::VoxelVolume;

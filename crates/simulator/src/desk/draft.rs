@@ -4,10 +4,7 @@
 //! It needs only the skull, of a cached case or of the CT once it is read, not the models that run,
 //! and is drawn with few rays until the session takes its place.
 
-use crate::case::folder;
-use crate::case::opening::Opening;
 use crate::error::SessionError;
-use crate::progress::{DraftSkull, Progress};
 use crate::show::picture::first_view;
 use std::path::Path;
 use std::sync::Arc;
@@ -15,6 +12,9 @@ use std::sync::mpsc::Receiver;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Pose, Vec3};
 use trepan_gpu::{Gpu, GpuError};
+use trepan_patient::folder;
+use trepan_patient::opening::Opening;
+use trepan_patient::progress::{DraftSkull, Progress};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData, SliceLook};
 use trepan_window::{Capture, Panel, Session, Stage, Start, WindowInput};
 

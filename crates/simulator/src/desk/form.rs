@@ -5,10 +5,10 @@ use crate::desk::language::Languages;
 use crate::error::SessionError;
 use crate::options::{Options, Patient};
 use crate::settings::{Images, Recent, Settings, Source, sessions};
-use crate::tissue_class::{TissueClass, TissueSource};
 use std::path::{Path, PathBuf};
 use trepan_budget::Quality;
 use trepan_haptics::{Listed, script};
+use trepan_patient::{TissueClass, TissueSource};
 use trepan_stages::program::{Program, called};
 use trepan_window::Choosable;
 

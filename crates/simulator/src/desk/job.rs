@@ -1,11 +1,11 @@
 //! A session on its own thread: it loads, runs in the window and writes its files.
 
-use crate::case::Case;
 use crate::error::SessionError;
-use crate::progress::{Progress, RUNNING, Stage};
 use crate::session::{Place, SessionResult};
 use crate::settings::Settings;
 use std::thread::JoinHandle;
+use trepan_patient::Case;
+use trepan_patient::progress::{Progress, RUNNING, Stage};
 
 /// What a job came to.
 pub(crate) enum Done {

@@ -26,6 +26,7 @@ use crate::options::Options;
 use crate::run::stop::Stop;
 use crate::show::driver;
 use crate::{Inputs, desk::language::Languages, desk::state::App};
+use trepan_patient::PatientError;
 use trepan_stages::program::Program;
 use trepan_window as window;
 
@@ -52,6 +53,6 @@ pub(crate) fn run(program: Program, options: Options, built_in: Inputs) -> Optio
     let done = job.map(|job| job.end(&mut form.settings)).or(last);
     match shown {
         Err(fault) => Some(Err(SessionError::Usage(format!("{fault}; or give --headless")))),
-        Ok(()) => done.filter(|done| !matches!(done, Err(SessionError::Cancelled))),
+        Ok(()) => done.filter(|done| !matches!(done, Err(SessionError::Patient(PatientError::Cancelled)))),
     }
 }

@@ -2,9 +2,7 @@
 
 use crate::Inputs;
 use crate::batch;
-use crate::case::Case;
-use crate::case::cache::Cache;
-use crate::case::choice::case_to_check;
+use crate::choice::case_to_check;
 use crate::compare::compare;
 use crate::desk::action::Action;
 use crate::desk::browse::{self, Folder, Goal};
@@ -17,7 +15,6 @@ use crate::desk::pictures::Pictures;
 use crate::desk::results::{self, Sessions};
 use crate::error::SessionError;
 use crate::options::Options;
-use crate::progress::Progress;
 use crate::report::kept::SessionFolder;
 use crate::run::stop::Stop;
 use crate::session::{Place, Session};
@@ -28,6 +25,9 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::Listed;
+use trepan_patient::Cache;
+use trepan_patient::progress::Progress;
+use trepan_patient::{Case, PatientError};
 use trepan_stages::program::Program;
 use trepan_window::{Content, Host, Page, Stage, speak};
 
@@ -152,7 +152,7 @@ impl App {
             Err(fault) => return self.fail(fault),
         };
         let Recent { name, hash, .. } = self.form.case.clone();
-        let cache = Cache::of(&options.patient).ok();
+        let cache = Cache::of(options.patient.cache.clone()).ok();
         let cached = cache.filter(|_| !hash.is_empty()).and_then(|cache| cache.find(&hash));
         let (again, progress) = (cached.is_some(), Progress::default());
         if self.program.has_bone() {
@@ -176,7 +176,7 @@ impl App {
             return self.look_at(*case);
         }
         self.view = match &done {
-            Err(SessionError::Cancelled) => View::Start,
+            Err(SessionError::Patient(PatientError::Cancelled)) => View::Start,
             Err(fault) => View::Page(Box::new(pages::fault(fault, &self.form.case.source))),
             Ok(_) if self.direct => View::Closed,
             Ok(Done::Viewed) => match self.viewed.take() {

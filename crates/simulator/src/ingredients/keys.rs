@@ -1,10 +1,10 @@
 //! The table of keys that `--set` takes, and what derives from it: parsing, lists, the user guide.
 
 use super::{Element, Ingredients, Law, Relaxation, SolverDevice, Support};
-use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use trepan_budget::Quality;
 use trepan_measurements::brain_membranes;
+use trepan_patient::TissueClass;
 use trepan_rigid::{Extent, god_object_sphere};
 
 /// One ingredient of the models.

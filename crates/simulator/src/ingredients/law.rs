@@ -5,9 +5,9 @@
 //! the exponent of Ogden's law is that of swine (Miller and Chinzei, J. Biomech. 35, 2002), the
 //! ratio of Mooney and Rivlin's constants from memory (Mendis, Stalnaker and Advani 1995).
 
-use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use trepan_measurements::brain_living;
+use trepan_patient::TissueClass;
 use trepan_soft::Material;
 
 /// Constitutive law of a tissue.

@@ -16,11 +16,11 @@ pub(crate) use keys::{KEYS, KeyValue, Part, setting, table};
 pub use law::Law;
 pub use variants::{Variant, of_quality, realistic, variants};
 
-use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use trepan_measurements::fits;
+use trepan_patient::TissueClass;
 use trepan_stages::BoneModels;
 
 /// What the models of a session are made of; `None` where `--quality` chooses.

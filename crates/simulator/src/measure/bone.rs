@@ -267,7 +267,7 @@ impl<'a> Surface<'a> {
     /// Height of the outermost bone over a point of the plane, mm.
     fn height(&self, aside: Vec3) -> Option<f32> {
         let step = 0.5 * self.bone.spacing_mm();
-        let over = |height: f32| over_isovalue(self.bone, self.place + aside + height * self.normal);
+        let over = |height: f32| self.bone.over_isovalue(self.place + aside + height * self.normal);
         let mut height = 10.0;
         while height > -10.0 {
             let (above, below) = (over(height), over(height - step));
@@ -278,18 +278,6 @@ impl<'a> Surface<'a> {
         }
         None
     }
-}
-
-/// Trilinear density minus the isovalue at a point, HU.
-pub(crate) fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
-    let at = bone.grid_of(point);
-    let (low, part) = (at.floor().as_ivec3(), at - at.floor());
-    let corner = |n: i32| {
-        let step = glam::IVec3::new(n & 1, n >> 1 & 1, n >> 2);
-        let weight = Vec3::select(step.cmpeq(glam::IVec3::ONE), part, 1.0 - part);
-        weight.element_product() * f32::from(bone.hu(low + step))
-    };
-    (0..8).map(corner).sum::<f32>() - f32::from(bone.isovalue())
 }
 
 /// Path in along the normal, then along the surface at constant depth below its smoothed height.

@@ -25,7 +25,7 @@
 use super::Parts;
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
-use super::tissue::{self, Brains, Fineness, LEAST_MM, Push, Shape};
+use super::tissue::{self, Brains, LEAST_MM, Push, Shape};
 use crate::error::SessionError;
 use crate::ingredients::Element;
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,7 @@ use trepan_budget::{
     holds_walls, picture_cores, tissue_cores,
 };
 use trepan_geometry::Vec3;
+use trepan_patient::Fineness;
 use trepan_rigid::Method;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.

@@ -8,13 +8,13 @@
 use crate::ingredients::Ingredients;
 use crate::measure::PlannedParts;
 use crate::run::clock::Clock;
-use crate::tissue_class::TissueClass;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_budget::Machine;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile, units};
 use trepan_mesh::Surface;
+use trepan_patient::TissueClass;
 use trepan_render::{Camera, Frame, ProcessorRenderer, SceneData, SliceLook};
 use trepan_rigid::{Method, RigidStep};
 use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};

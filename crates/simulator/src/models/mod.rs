@@ -27,13 +27,13 @@ use crate::ingredients::{Element, Ingredients};
 use crate::measure::{self, CaseErrors, Parts, PlannedParts};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
-use crate::recipe::Recipe;
-use crate::tissue_class::TissueClass;
 use crate::uncertainty;
 use overrides::{Overrides, written};
-use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
+use trepan_patient::Recipe;
+use trepan_patient::TissueClass;
+use trepan_patient::import::Facts;
 use trepan_soft::Material;
 use trepan_stages::haptic_config::BONE_STIFFNESS;
 use trepan_stages::program::Program;
@@ -57,15 +57,6 @@ pub struct Models {
     pub plan: Option<Plan>,
     /// Whether the errors were measured in this case.
     pub measured: Parts<bool>,
-}
-
-/// Properties of the images that the choice of voxel size and mesh depends on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Facts {
-    /// Mean edge of the CT's voxels, mm. `None` without a CT.
-    pub ct_voxel_mm: Option<f64>,
-    /// Volume of the brain, mm³; `None` without an MRI.
-    pub brain_mm3: Option<f64>,
 }
 
 /// Request for a session's models, before its case is opened.

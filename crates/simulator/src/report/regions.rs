@@ -9,11 +9,11 @@
 //! # When not to use it
 //! For functional regions: there is no atlas.
 
-use crate::case::scene::RestBrain;
-use crate::tissue_class::TissueClass;
 use serde::Serialize;
 use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::TickRecord;
+use trepan_patient::RestBrain;
+use trepan_patient::TissueClass;
 use trepan_volume::DistanceField;
 
 /// Force on one region over time.

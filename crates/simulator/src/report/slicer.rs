@@ -8,7 +8,6 @@
 //! Schema v1.0.3:
 //! <https://github.com/Slicer/Slicer/tree/main/Modules/Loadable/Markups/Resources/Schema>.
 
-use crate::case::plan::Plan;
 use crate::error::SessionError;
 use crate::whole::whole;
 use serde_json::{Value, json};
@@ -16,6 +15,7 @@ use std::f32::consts::TAU;
 use std::path::Path;
 use trepan_geometry::Vec3;
 use trepan_link::wire::TickRecord;
+use trepan_patient::Plan;
 
 /// The point where the skull is opened, and those below it.
 pub(crate) const OPENING: &str = "opening.mrk.json";

@@ -1,6 +1,5 @@
 //! `summary.json`: the results of a session as numbers.
 
-use crate::case::plan::Plan;
 use crate::models::ModelSummary;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
@@ -11,6 +10,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use trepan_bone::Piece;
 use trepan_contact::GuardCounters;
+use trepan_patient::Plan;
 use trepan_stages::alarms::REAL_TIME;
 use trepan_stages::by_cause;
 use trepan_stages::notice::{Notice, What};

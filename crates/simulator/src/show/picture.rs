@@ -2,7 +2,6 @@
 //! the window.
 
 use crate::SessionError;
-use crate::case::opening::eye;
 use crate::report::page::Shot;
 use crate::report::summary::MovingSummary;
 use crate::run::clock::Clock;
@@ -14,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
+use trepan_patient::opening::eye;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;

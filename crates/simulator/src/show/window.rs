@@ -5,7 +5,6 @@
 //! mouse pose at its own rate. Closing the window ends the session.
 
 use crate::SessionError;
-use crate::progress::Progress;
 use crate::report::page::Shot;
 use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
 use crate::run::stop::Stop;
@@ -23,6 +22,7 @@ use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
+use trepan_patient::progress::Progress;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 use trepan_stages::notice::Notice;
 use trepan_stages::program::Program;

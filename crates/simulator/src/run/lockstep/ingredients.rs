@@ -1,19 +1,20 @@
 //! Every key of `--set` in a short operation without a device: its effect on the hand, and replays.
 
 use super::*;
-use crate::case::opening::Opening;
-use crate::case::{Brain, Case};
 use crate::config::SessionConfig;
 use crate::device_limits::DeviceLimits;
 use crate::ingredients::{KEYS, SolverDevice};
 use crate::measure::CaseErrors;
-use crate::models::{Facts, ModelRequest};
+use crate::models::ModelRequest;
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::session_setup::SessionSetup;
 use clap::Parser;
 use trepan_geometry::{Quat, ToolKind, Vec3};
 use trepan_haptics::{Capabilities, DeviceName};
+use trepan_patient::import::Facts;
+use trepan_patient::opening::Opening;
+use trepan_patient::{Brain, Case};
 use trepan_soft::boxes;
 use trepan_stages::force_scale::ForceScale;
 use trepan_stages::program::{Phase, Program};

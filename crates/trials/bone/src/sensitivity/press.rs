@@ -10,7 +10,8 @@ use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_measurements::{brain_living, brain_membranes, fits, hands, sensitivity};
 use trepan_mesh::Surface;
-use trepan_simulator::{HapticConfig, Program, TissueClass};
+use trepan_patient::TissueClass;
+use trepan_simulator::{HapticConfig, Program};
 use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 

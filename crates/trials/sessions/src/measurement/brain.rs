@@ -13,7 +13,7 @@ use trepan_evidence::picture::Series;
 use trepan_evidence::suite::Findings;
 use trepan_geometry::Vec3;
 use trepan_measurements::{Row, brain, brain_living, brain_rate, brain_relaxation, fits, tissue};
-use trepan_simulator::TissueClass;
+use trepan_patient::TissueClass;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 

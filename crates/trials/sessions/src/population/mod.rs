@@ -28,7 +28,8 @@ use trepan_evidence::part::{Part, Scope};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_evidence::worst::{self, Rank};
 use trepan_geometry::Vec3;
-use trepan_simulator::{Inputs, Options, Program, Session};
+use trepan_patient::Inputs;
+use trepan_simulator::{Options, Program, Session};
 use trepan_trials_scenes::population::{BaseHead, Files, Head, HeadRecipe, base_heads};
 use trepan_volume::{VoxelVolume, nifti, resample};
 

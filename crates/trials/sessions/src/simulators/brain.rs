@@ -15,9 +15,9 @@ use std::sync::Arc;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
+use trepan_patient::{Cache, RestBrain, Scene, TissueClass, open_case};
 use trepan_simulator::{
-    Cache, CollisionStage, HapticStage, Phase, Program, RestBrain, Scene, Settling, SoftFrame, SolverStage, TickInput,
-    TissueClass, ToolSample, open_case,
+    CollisionStage, HapticStage, Phase, Program, Settling, SoftFrame, SolverStage, TickInput, ToolSample,
 };
 use trepan_soft::{Body, Loads};
 use trepan_trials_scenes::case;

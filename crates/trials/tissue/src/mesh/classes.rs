@@ -14,7 +14,7 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, quantile};
 use trepan_mesh::lattice::{Config, Domain, LabelledMesh};
 use trepan_mesh::{Quality, Surface};
-use trepan_simulator::measure::tissue::Fineness;
+use trepan_patient::Fineness;
 use trepan_trials_scenes::population::{BaseHead, Head, HeadRecipe, base_heads};
 use trepan_volume::{DistanceField, Grid, Interpolation, VoxelVolume, resample};
 

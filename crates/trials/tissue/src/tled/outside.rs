@@ -26,9 +26,8 @@ use trepan_evidence::part::Part;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
 use trepan_mesh::{TetMesh, lattice};
-use trepan_simulator::measure::tissue::{
-    BallContact, Fineness, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes,
-};
+use trepan_patient::Fineness;
+use trepan_simulator::measure::tissue::{BallContact, MASS_ADDED, PressedBall, Surroundings, disc, fixed_nodes};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 use trepan_volume::{DistanceField, Grid, Interpolation, VoxelVolume, largest_component, read, resample};

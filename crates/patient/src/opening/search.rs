@@ -9,14 +9,13 @@
 //! ray.
 
 use super::{BELOW_BONE_MM, Vec3};
-use crate::error::SessionError;
-use crate::measure::bone::over_isovalue;
+use crate::PatientError;
 use trepan_bone::BoneVolume;
 use trepan_haptics::script::Site;
 use trepan_volume::DistanceField;
 
 /// Start of the rays, mm from the centre of the head.
-pub(super) const FAR_MM: f32 = 160.0;
+pub(crate) const FAR_MM: f32 = 160.0;
 /// Rays over the whole sphere.
 const RAYS: usize = 3200;
 /// Step along a line, mm; surfaces are interpolated between steps.
@@ -43,7 +42,7 @@ const AROUND_MM: f32 = 10.0;
 const LOST_MM: f32 = 10.0;
 
 /// Geometry that lines are intersected with.
-pub(super) struct Surroundings<'a> {
+pub(crate) struct Surroundings<'a> {
     pub bone: &'a BoneVolume,
     pub brain: Option<&'a DistanceField>,
     /// Centre of the head.
@@ -96,7 +95,7 @@ impl Surroundings<'_> {
 
     /// Best place on the upper right front if one is suitable there, else on the vault; the error
     /// says why none is.
-    pub fn best(&self) -> Result<Site, SessionError> {
+    pub fn best(&self) -> Result<Site, PatientError> {
         let right_front = |d: &Vec3| d.x > 0.25 && d.y > -0.2 && d.z > 0.45;
         let vault = |d: &Vec3| d.z > 0.2;
         let suits = |found: &Option<Candidate>| found.as_ref().is_some_and(|best| best.beyond_mm == 0.0);
@@ -115,7 +114,7 @@ impl Surroundings<'_> {
             }
             None => format!("no line from above meets bone{}", with_brain(" and then brain".into())),
         };
-        Err(SessionError::Case(format!("{fault}: {remedy}")))
+        Err(PatientError::Case(format!("{fault}: {remedy}")))
     }
 
     fn best_of(&self, region: impl Fn(&Vec3) -> bool) -> Option<Candidate> {
@@ -153,7 +152,7 @@ impl Surroundings<'_> {
     /// Intersects a line from `from` along `inward` with bone and brain between two depths. `None`
     /// if it misses either or meets brain first.
     fn passage(&self, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<Passage> {
-        let over = |t: f32| over_isovalue(self.bone, from + t * inward);
+        let over = |t: f32| self.bone.over_isovalue(from + t * inward);
         let begin = first(start, end, over)?;
         let brain = |t: f32| self.brain.map_or(-1.0, |field| -field.sample(from + t * inward));
         if first(start, begin, brain).is_some() {
@@ -194,8 +193,8 @@ fn cost(hole: &[(Vec3, Passage)]) -> f32 {
 }
 
 /// First entry into bone and last exit from it between two depths of a line, mm.
-pub(super) fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
-    let over = |t: f32| over_isovalue(bone, from + t * inward);
+pub(crate) fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
+    let over = |t: f32| bone.over_isovalue(from + t * inward);
     let outer = first(start, end, over)?;
     let back = first(0.0, end - outer, |t| over(end - t))?;
     Some([outer, end - back])
@@ -203,7 +202,7 @@ pub(super) fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, en
 
 /// First depth between `start` and `end` at which a value reaches 0, interpolated between steps,
 /// mm.
-pub(super) fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
+pub(crate) fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
     let steps = ((end - start) / STEP_MM).max(0.0) as usize;
     let mut before = None;
     for n in 0..=steps {

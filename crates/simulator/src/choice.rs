@@ -1,17 +1,18 @@
 //! Opens the case that the options name, and builds case folders.
 
-use crate::case::cache::Cache;
-use crate::case::identity::{self, Identity, USERS};
-use crate::case::import::{PendingCase, volume_mm3};
-use crate::case::{Case, Inputs, folder, import};
 use crate::error::SessionError;
-use crate::models::{self, Facts, ModelRequest, Models};
+use crate::measure::in_case;
+use crate::models::{self, ModelRequest, Models};
 use crate::options::{Options, Patient};
-use crate::progress::Progress;
-use crate::recipe::Recipe;
-use crate::tissue_class::TissueClass;
 use std::path::Path;
 use trepan_budget::Setup;
+use trepan_patient::Cache;
+use trepan_patient::Recipe;
+use trepan_patient::TissueClass;
+use trepan_patient::identity::{self, Identity, USERS};
+use trepan_patient::import::{self, Import};
+use trepan_patient::progress::Progress;
+use trepan_patient::{Case, Inputs, folder};
 use trepan_stages::program::Program;
 
 /// Opens the named case folder, the given images or the built-in case, with the models of the
@@ -28,23 +29,22 @@ pub(crate) fn open_case(
         let case = fitting(program, folder::load(folder)?)?;
         let classes = case.brain.as_ref().map(|brain| &brain.classes.data);
         check_forbidden(options, |class| classes.is_some_and(|classes| classes.contains(&class.code())))?;
-        let models = on_case(request, &case, &Cache::of(&options.patient)?, card)?;
+        let models = on_case(request, &case, &cache(&options.patient)?, card)?;
         models.log();
         return Ok((case, models));
     }
-    let (inputs, mut models) = (inputs(&options.patient, built_in), None);
+    let inputs = inputs(&options.patient, built_in);
     check_forbidden(options, |class| class == TissueClass::Brain || inputs.tissues.iter().any(|t| t.class == class))?;
-    let requested = recipe(&options.patient);
-    let case = import::open_by(program, (&inputs, &requested), &Cache::of(&options.patient)?, progress, |pending| {
-        let facts = pending.facts;
-        let settled = models
-            .insert(request.settle(&facts, card, |scene, rows, element| pending.case_errors(scene, rows, element))?);
-        pending.stages.suspend(|| settled.log());
-        let Setup { bone, tissue, .. } = settled.setup;
-        Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..requested })
-    })?;
-    let unsettled = || SessionError::Internal("a case without models".into());
-    Ok((case, models.ok_or_else(unsettled)?))
+    let (requested, cache) = (recipe(&options.patient), cache(&options.patient)?);
+    let mut import = Import::begin(program, (&inputs, &requested), &cache, progress)?;
+    let facts = import.facts;
+    let models = request
+        .settle(&facts, card, |scene, rows, element| in_case::before_building(&mut import, scene, rows, element))?;
+    import.stages.suspend(|| models.log());
+    let Setup { bone, tissue, .. } = models.setup;
+    let (spacing_mm, tets, halvings) = (bone.spacing_mm as f32, tissue.tets, tissue.halvings);
+    let case = import.build(Recipe { spacing_mm, tets, halvings, ..requested })?;
+    Ok((case, models))
 }
 
 /// Opens a case to look at, without the models of a session. It is the named folder, the cached
@@ -58,15 +58,15 @@ pub(crate) fn case_to_check(
 ) -> Result<Case, SessionError> {
     progress.next("looking at the images")?;
     if let Some(folder) = &options.case {
-        return folder::load(folder);
+        return Ok(folder::load(folder)?);
     }
-    let cache = Cache::of(&options.patient)?;
+    let cache = cache(&options.patient)?;
     let known = Some(hash).filter(|hash| !hash.is_empty()).and_then(|hash| cache.find(hash));
     if let Some(Ok(case)) = known.map(|folder| folder::load(&folder)) {
         return Ok(case);
     }
     let recipe = recipe(&options.patient);
-    import::open_by(program, (&inputs(&options.patient, built_in), &recipe), &cache, progress, |_| Ok(recipe))
+    Ok(Import::begin(program, (&inputs(&options.patient, built_in), &recipe), &cache, progress)?.build(recipe)?)
 }
 
 /// Refuses a class of `--forbid` that the case does not contain.
@@ -85,7 +85,7 @@ fn check_forbidden(options: &Options, has_class: impl Fn(TissueClass) -> bool) -
 /// Identity of the case that the options name, without building it.
 pub(crate) fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, SessionError> {
     match &options.case {
-        Some(folder) => folder::identity(folder),
+        Some(folder) => Ok(folder::identity(folder)?),
         None => {
             let (inputs, recipe) = (inputs(&options.patient, built_in.clone()), recipe(&options.patient));
             let name = inputs.name.unwrap_or(USERS).to_string();
@@ -115,15 +115,16 @@ pub(crate) fn plan_case(
     match case {
         Some(folder) => {
             let case = fitting(program, folder::load(folder)?)?;
-            Ok(PlannedCase { models: on_case(request, &case, &Cache::of(patient)?, card)?, notes: case.notes })
+            Ok(PlannedCase { models: on_case(request, &case, &cache(patient)?, card)?, notes: case.notes })
         }
         None => {
-            let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of(patient)?);
-            let mut pending = PendingCase::of(program, (&inputs, &recipe), &cache, &Progress::default())?;
-            let (facts, notes) = (pending.facts, pending.notes.clone());
-            let models =
-                request.settle(&facts, card, |scene, rows, element| pending.case_errors(scene, rows, element))?;
-            pending.store();
+            let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), cache(patient)?);
+            let mut import = Import::begin(program, (&inputs, &recipe), &cache, &Progress::default())?;
+            let (facts, notes) = (import.facts, import.notes.clone());
+            let models = request.settle(&facts, card, |scene, rows, element| {
+                in_case::before_building(&mut import, scene, rows, element)
+            })?;
+            import.store();
             Ok(PlannedCase { models, notes })
         }
     }
@@ -137,11 +138,7 @@ fn on_case(
     card: impl FnOnce() -> bool,
 ) -> Result<Models, SessionError> {
     let request = case.recipe.iter().fold(request, ModelRequest::on);
-    let facts = Facts {
-        ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
-        brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
-    };
-    request.settle(&facts, card, |scene, rows, element| import::errors_in(case, cache, scene, rows, element))
+    request.settle(&case.facts(), card, |scene, rows, element| in_case::built(case, cache, scene, rows, element))
 }
 
 /// A case that was built in a folder.
@@ -167,7 +164,7 @@ pub(crate) fn build_case(
         )));
     }
     let recipe = recipe(patient);
-    let case = import::open(program, &inputs(patient, built_in), &recipe, &Cache::of(patient)?)?;
+    let case = import::open(program, &inputs(patient, built_in), &recipe, &cache(patient)?)?;
     let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = out.file_name().and_then(|name| name.to_str()).unwrap_or("case");
     let written = Cache::at(parent.into()).keep(name, |place| folder::save(&case, place));
@@ -204,6 +201,11 @@ pub(super) fn recipe(patient: &Patient) -> Recipe {
         register: patient.register,
         opening: patient.opening,
     }
+}
+
+/// Cache in the folder that the flags name, else the user's.
+pub(crate) fn cache(patient: &Patient) -> Result<Cache, SessionError> {
+    Ok(Cache::of(patient.cache.clone())?)
 }
 
 /// Given input files; those of the built-in case if none is given.

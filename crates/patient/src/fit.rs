@@ -6,7 +6,7 @@ use trepan_render::{RgbPicture, overlap_pictures};
 use trepan_volume::VoxelVolume;
 
 /// Overlay pictures: a row of three planes for each pose of the MRI.
-pub(crate) struct Fit {
+pub struct Fit {
     rows: Vec<[RgbPicture; 3]>,
 }
 

@@ -1,10 +1,10 @@
 //! Builds a skull on cubic voxels, a brain mask and tetrahedra from a patient's images.
 
-use crate::case::{Brain, Inputs};
-use crate::error::SessionError;
+use crate::PatientError;
+use crate::Recipe;
 use crate::mixture;
-use crate::recipe::Recipe;
 use crate::remark::WELL;
+use crate::{Brain, Inputs};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
 use trepan_mesh::lattice::{self, Fine};
@@ -28,29 +28,29 @@ fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
 }
 
 /// Reads a CT in HU, and adds remarks on it.
-pub(super) fn read_ct(
+pub(crate) fn read_ct(
     path: &Path,
     series: Option<usize>,
     notes: &mut Vec<String>,
-) -> Result<VoxelVolume<i16>, SessionError> {
+) -> Result<VoxelVolume<i16>, PatientError> {
     let import = image(path, series)?;
     of_modality(path, &import, "CT")?;
     of_a_patient(path, &import.volume)?;
     notes.extend(import.notes.iter().map(|note| format!("CT: {note}")));
-    hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
+    hounsfield(&import.volume).map_err(|fault| PatientError::Case(format!("{}: {fault}", path.display())))
 }
 
 /// Reads the original CT of a case again; `None` for a case folder, which does not hold it.
-pub(crate) fn scanned(inputs: &Inputs, series: Option<usize>) -> Option<Result<VoxelVolume<i16>, SessionError>> {
+pub fn scanned(inputs: &Inputs, series: Option<usize>) -> Option<Result<VoxelVolume<i16>, PatientError>> {
     inputs.ct.as_deref().map(|path| read_ct(path, series, &mut Vec::new()))
 }
 
 /// Reads an MRI, and adds remarks on it; refuses voxels that are not finite, and CTs.
-pub(super) fn read_mri(
+pub(crate) fn read_mri(
     path: &Path,
     series: Option<usize>,
     notes: &mut Vec<String>,
-) -> Result<VoxelVolume<f32>, SessionError> {
+) -> Result<VoxelVolume<f32>, PatientError> {
     let import = image(path, series)?;
     of_modality(path, &import, "MR")?;
     of_a_patient(path, &import.volume)?;
@@ -58,10 +58,10 @@ pub(super) fn read_mri(
     let bad = import.volume.data.iter().filter(|v| !v.is_finite()).count();
     if bad > 0 {
         let fault = MaskError::NotANumber { count: bad };
-        return Err(SessionError::Case(format!("{}: {fault}", path.display())));
+        return Err(PatientError::Case(format!("{}: {fault}", path.display())));
     }
     if is_ct(&import.volume) {
-        return Err(SessionError::Case(format!(
+        return Err(PatientError::Case(format!(
             "{}: the values are a CT's (air near -1000, bone over 200): {GIVE}",
             path.display()
         )));
@@ -77,7 +77,7 @@ const FLAT: f64 = 0.6;
 const LABELS_ML: std::ops::RangeInclusive<f64> = 300.0..=2000.0;
 
 /// Refuses a mask or a label volume given as an MRI.
-fn no_labels(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionError> {
+fn no_labels(path: &Path, image: &VoxelVolume<f32>) -> Result<(), PatientError> {
     let (flat, shown_ml) = flatness(image);
     if flat < FLAT {
         return Ok(());
@@ -89,7 +89,7 @@ fn no_labels(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionError> 
     if is_head || shown_ml < *LABELS_ML.start() {
         return Ok(());
     }
-    Err(SessionError::Case(format!(
+    Err(PatientError::Case(format!(
         "{}: {:.0} % of its neighbouring voxels have one value, and it has {} values: it is a mask or a label volume, no MRI; give it with --labels or --tissue, and a T1 MRI with --mri",
         path.display(),
         100.0 * flat,
@@ -103,11 +103,11 @@ const TISSUE_HU: std::ops::RangeInclusive<i16> = -200..=250;
 /// Doubts that a CT is in HU, by its commonest tissue.
 ///
 /// It is an error if a brain is to be found in it and much of what is not air passes for bone.
-pub(super) fn scale_doubt(
+pub(crate) fn scale_doubt(
     ct: &VoxelVolume<i16>,
     isovalue_hu: i16,
     with_mri: bool,
-) -> Result<Option<String>, SessionError> {
+) -> Result<Option<String>, PatientError> {
     const AIR: i16 = -500;
     const BIN: usize = 50;
     let mut counts = [0usize; 2000 / BIN];
@@ -131,7 +131,7 @@ pub(super) fn scale_doubt(
         tissue_hu + 400
     );
     match with_mri && dense > 1.0 / 3.0 {
-        true => Err(SessionError::Case(found)),
+        true => Err(PatientError::Case(found)),
         false => Ok(Some(found)),
     }
 }
@@ -140,13 +140,13 @@ pub(super) fn scale_doubt(
 const LONGEST_MM: f64 = 3000.0;
 
 /// Refuses an image larger than a patient, whose voxel edges are in a wrong unit.
-fn of_a_patient(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionError> {
+fn of_a_patient(path: &Path, image: &VoxelVolume<f32>) -> Result<(), PatientError> {
     let (low, high) = image.world_corners();
     let span = (high - low).max_element();
     if span <= LONGEST_MM {
         return Ok(());
     }
-    Err(SessionError::Case(format!(
+    Err(PatientError::Case(format!(
         "{}: the image spans {span:.0} mm, its voxel edges are {:.3} mm: no patient is longer than {LONGEST_MM} mm; correct the voxel edges or their unit",
         path.display(),
         image.spacing_mm()
@@ -157,24 +157,24 @@ fn of_a_patient(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionErro
 const GIVE: &str = "give the CT with --ct and a T1 MRI with --mri";
 
 /// Refuses a series of another DICOM modality.
-fn of_modality(path: &Path, import: &Import, expected: &str) -> Result<(), SessionError> {
+fn of_modality(path: &Path, import: &Import, expected: &str) -> Result<(), PatientError> {
     match import.modality.as_deref() {
         Some(found) if found != expected && found != "OT" => {
             let fault = format!("{}: its DICOM modality is {found}, not {expected}: {GIVE}", path.display());
-            Err(SessionError::Case(fault))
+            Err(PatientError::Case(fault))
         }
         _ => Ok(()),
     }
 }
 
 /// Registers the MRI to the CT in place; returns the transform.
-pub(super) fn registered(
+pub(crate) fn registered(
     ct: &VoxelVolume<i16>,
     mri: &mut VoxelVolume<f32>,
     notes: &mut Vec<String>,
-) -> Result<DAffine3, SessionError> {
+) -> Result<DAffine3, PatientError> {
     let found = register(ct, mri, &RegistrationConfig::default());
-    let found = found.map_err(|fault| SessionError::Case(fault.to_string()))?;
+    let found = found.map_err(|fault| PatientError::Case(fault.to_string()))?;
     let (_, turn, _) = found.fixed_from_moving.to_scale_rotation_translation();
     let middle = mri.centre_of(mri.dims.map(|n| n / 2));
     let moved_mm = found.fixed_from_moving.transform_point3(middle).distance(middle);
@@ -203,30 +203,30 @@ fn brain_note(confidence: &BrainConfidence) -> String {
 }
 
 /// Reads a label volume as a mask of its nonzero voxels.
-pub(super) fn read_labels(path: &Path) -> Result<VoxelVolume<u8>, SessionError> {
+pub(crate) fn read_labels(path: &Path) -> Result<VoxelVolume<u8>, PatientError> {
     Ok(Segmentation::read(path)?.mask(|_, code| code != 0))
 }
 
 /// Brain mask: the labels given, with their file, else a segmentation of the MRI.
-pub(super) fn find_brain(
+pub(crate) fn find_brain(
     given: Option<(&Path, VoxelVolume<u8>)>,
     mri: &VoxelVolume<f32>,
     ct_from_mri: DAffine3,
     ct: Option<&VoxelVolume<i16>>,
     isovalue_hu: i16,
     notes: &mut Vec<String>,
-) -> Result<VoxelVolume<u8>, SessionError> {
+) -> Result<VoxelVolume<u8>, PatientError> {
     let config = BrainConfig { isovalue: Some(isovalue_hu), ..BrainConfig::default() };
     let Some((path, mut whole)) = given else {
         let found = trepan_volume::find_brain(mri, ct, &config);
-        let found = found.map_err(|fault| SessionError::Case(format!("{fault} (--labels PATH)")))?;
+        let found = found.map_err(|fault| PatientError::Case(format!("{fault} (--labels PATH)")))?;
         notes.push(brain_note(&found.confidence));
         if found.is_stripped {
             notes.push("the MRI shows the brain alone (skull-stripped): what it shows is the brain".into());
         }
         return Ok(found.mask);
     };
-    let case = |fault: String| SessionError::Case(format!("{}: {fault}", path.display()));
+    let case = |fault: String| PatientError::Case(format!("{}: {fault}", path.display()));
     whole.world_from_voxel = ct_from_mri * whole.world_from_voxel;
     let mask = largest_component(&whole);
     match check_brain_mask(&mask, &config) {
@@ -240,24 +240,24 @@ pub(super) fn find_brain(
 
 /// Resamples a CT around its bone to cubic voxels, by a spline whose isosurface has no creases, and
 /// keeps the largest piece of bone. Also returns what was loose.
-pub(super) fn make_skull(
+pub(crate) fn make_skull(
     ct: &VoxelVolume<i16>,
     recipe: &Recipe,
     isovalue_hu: i16,
-) -> Result<(VoxelVolume<i16>, Islands), SessionError> {
+) -> Result<(VoxelVolume<i16>, Islands), PatientError> {
     let is_bone = |hu: &i16| *hu >= isovalue_hu;
     let grid = around_bone(ct, recipe.spacing_mm, ct.box_where(is_bone));
     room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
         let text =
             format!("the skull at --spacing-mm {}: {fault}; give a larger spacing or crop the CT", recipe.spacing_mm);
-        SessionError::Usage(text)
+        PatientError::Usage(text)
     })?;
     let mut skull = resample(ct, &grid, Interpolation::Cubic, AIR_HU);
     let islands = skull_only(&mut skull, isovalue_hu);
     // Beside a step the spline reaches above the CT: what is bone, the CT itself says.
     let bone = skull.box_where(is_bone).filter(|_| ct.data.iter().any(is_bone));
     let Some(bone) = bone else {
-        return Err(SessionError::Case(format!(
+        return Err(PatientError::Case(format!(
             "no voxel of the CT reaches {isovalue_hu} HU: there is no bone; give --isovalue-hu"
         )));
     };
@@ -294,12 +294,12 @@ fn around_bone(ct: &VoxelVolume<i16>, spacing_mm: f32, bone: Option<[[usize; 3];
 }
 
 /// Builds the tissue classes on a grid around the brain.
-pub(super) fn make_classes(
+pub(crate) fn make_classes(
     (inputs, tissues): (&Inputs, Vec<VoxelVolume<u8>>),
     mask: &VoxelVolume<u8>,
     ct_from_mri: DAffine3,
     notes: &mut Vec<String>,
-) -> Result<VoxelVolume<u8>, SessionError> {
+) -> Result<VoxelVolume<u8>, PatientError> {
     let mut classes = cropped(mask)?;
     for (source, here) in inputs.tissues.iter().zip(tissues) {
         notes.push(source.paint(here, ct_from_mri, &mut classes)?);
@@ -308,31 +308,31 @@ pub(super) fn make_classes(
 }
 
 /// Builds the brain: the MRI on the grid of the classes, and tetrahedra, refined at the opening.
-pub(super) fn make_brain(
+pub(crate) fn make_brain(
     whole: VoxelVolume<f32>,
     classes: VoxelVolume<u8>,
     fine: Option<Fine>,
     recipe: &Recipe,
-) -> Result<Brain, SessionError> {
+) -> Result<Brain, PatientError> {
     room_for("tetrahedra", recipe.tets as u64, TET_BYTES)
-        .map_err(|fault| SessionError::Usage(format!("--tets {}: {fault}; give fewer", recipe.tets)))?;
+        .map_err(|fault| PatientError::Usage(format!("--tets {}: {fault}; give fewer", recipe.tets)))?;
     let mri = resample(&whole, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
     // The mesher takes the most memory of an import.
     drop(whole);
     let config = lattice::Config::with_opening(recipe.tets, fine);
     let labelled = lattice::labelled(&classes.map(u16::from), &config)
-        .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
-    labelled.mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
+        .map_err(|fault| PatientError::Case(format!("meshing the brain: {fault}")))?;
+    labelled.mesh.check().map_err(|fault| PatientError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
     let (class_of_tet, mixtures) = mixture::codes(&labelled);
     Ok(Brain { classes, mri, mesh: labelled.mesh, class_of_tet, mixtures })
 }
 
 /// Resamples the mask to cubic voxels of 0.8 to 1.5 mm and crops it to its content with a margin.
-pub(super) fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, SessionError> {
+pub(crate) fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, PatientError> {
     let spacing = mask.spacing_mm().min_element().clamp(0.8, 1.5) as f32;
     let grid = Grid::isotropic_over(mask, spacing);
     room_for_voxels(grid.voxels() as u64, 16).map_err(|fault| {
-        SessionError::Case(format!("the brain mask on {spacing} mm cubes: {fault}; crop the MRI or the labels"))
+        PatientError::Case(format!("the brain mask on {spacing} mm cubes: {fault}; crop the MRI or the labels"))
     })?;
     let whole = resample(mask, &grid, Interpolation::Nearest, 0);
     let [low, high] = whole.box_where(|v| *v != 0).unwrap_or_default();

@@ -21,8 +21,8 @@
 //! Layer: N. J. Bennion et al., PMC9748497. Every constant is a row of `support.csv` in
 //! `fixtures/measurements`.
 
-use crate::case::plan::Plan;
-use crate::case::scene::{RestBrain, below};
+use crate::plan::Plan;
+use crate::scene::{RestBrain, below};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_deformable::{BorderNode, ConfigError};

@@ -5,7 +5,7 @@
 //! volume names it. Later sources override earlier ones. Labels outside the brain are left out and
 //! counted.
 
-use crate::error::SessionError;
+use crate::PatientError;
 use crate::remark::WELL;
 use glam::DAffine3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -188,7 +188,7 @@ impl TissueSource {
     }
 
     /// Reads the label volumes of sources, each file once; returns a mask of each and remarks.
-    pub fn read_all(sources: &[Self], notes: &mut Vec<String>) -> Result<Vec<VoxelVolume<u8>>, SessionError> {
+    pub fn read_all(sources: &[Self], notes: &mut Vec<String>) -> Result<Vec<VoxelVolume<u8>>, PatientError> {
         let mut masks = Vec::new();
         for of_file in sources.chunk_by(|a, b| a.path == b.path) {
             let read = Segmentation::read(&of_file[0].path)?;
@@ -200,9 +200,9 @@ impl TissueSource {
     }
 
     /// Mask of the class in its label volume, and remarks.
-    fn mask(&self, read: &Segmentation, notes: &mut Vec<String>) -> Result<VoxelVolume<u8>, SessionError> {
+    fn mask(&self, read: &Segmentation, notes: &mut Vec<String>) -> Result<VoxelVolume<u8>, PatientError> {
         let names = || read.segments.iter().map(|segment| segment.name.as_str()).collect::<Vec<_>>().join(", ");
-        let case = |fault: String| SessionError::Case(format!("--tissue {}: {fault}", self.class.name()));
+        let case = |fault: String| PatientError::Case(format!("--tissue {}: {fault}", self.class.name()));
         let mut chosen = Vec::new();
         for name in &self.names {
             let of_name = |segment: &&Segment| segment.name.eq_ignore_ascii_case(name);
@@ -246,7 +246,7 @@ impl TissueSource {
         mut here: VoxelVolume<u8>,
         ct_from_mri: DAffine3,
         classes: &mut VoxelVolume<u8>,
-    ) -> Result<String, SessionError> {
+    ) -> Result<String, PatientError> {
         here.world_from_voxel = ct_from_mri * here.world_from_voxel;
         let all = here.data.iter().filter(|&&v| v != 0).count();
         let all_ml = all as f64 * here.spacing_mm().element_product() * 1e-3;
@@ -259,7 +259,7 @@ impl TissueSource {
         let ml = painted as f64 * classes.spacing_mm().element_product() * 1e-3;
         let name = self.class.name();
         if painted == 0 {
-            return Err(SessionError::Case(format!(
+            return Err(PatientError::Case(format!(
                 "--tissue {name}: {}: {} fill {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and labels that are in them",
                 self.path.display(),
                 self.labels()
@@ -267,7 +267,7 @@ impl TissueSource {
         }
         // Vessels run outside the brain too.
         if ml < LEAST_INSIDE * all_ml && self.class != TissueClass::Vessel {
-            return Err(SessionError::Case(format!(
+            return Err(PatientError::Case(format!(
                 "--tissue {name}: {}: only {ml:.1} ml of its {all_ml:.1} ml lie in the brain, so it may be another patient's: give labels in the MRI's space, or a brain that contains them with --labels PATH",
                 self.path.display()
             )));

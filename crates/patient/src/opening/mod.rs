@@ -6,7 +6,7 @@
 //! ([`REFERENCE_MM`]), whatever the voxel size of the session. Rays run from outside towards the
 //! brain's centre, evenly spread over the upper right front of the head, else over the whole vault.
 //! Around each ray, parallel lines within the hole and at a flap's rim intersect outer table, inner
-//! table and brain; see [`search`]. Entry, bone thickness and brain depth are then measured along
+//! table and brain; see `search.rs`. Entry, bone thickness and brain depth are then measured along
 //! the chosen line on the session's skull.
 //!
 //! # When not to use it
@@ -14,9 +14,9 @@
 
 mod search;
 
-use crate::case::anatomy::make_skull;
-use crate::error::SessionError;
-use crate::recipe::Recipe;
+use crate::PatientError;
+use crate::Recipe;
+use crate::anatomy::make_skull;
 use search::Surroundings;
 use serde::{Deserialize, Serialize};
 use trepan_bone::BoneVolume;
@@ -25,7 +25,7 @@ use trepan_haptics::script::Site;
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Voxel edge of the skull in which an opening is searched, mm.
-pub(crate) const REFERENCE_MM: f32 = 1.0;
+pub const REFERENCE_MM: f32 = 1.0;
 
 /// Assumed depth of the brain below bone without an MRI, mm.
 const BELOW_BONE_MM: f32 = 5.0;
@@ -47,8 +47,8 @@ pub struct Opening {
 }
 
 /// Bone volume of a skull, for drilling.
-pub(crate) fn bone_of(skull: VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
-    BoneVolume::of(skull, isovalue_hu).map_err(|fault| SessionError::Case(format!("the CT: {fault}")))
+pub fn bone_of(skull: VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, PatientError> {
+    BoneVolume::of(skull, isovalue_hu).map_err(|fault| PatientError::Case(format!("the CT: {fault}")))
 }
 
 /// Depth below the bone's surface at which a point still counts as on it, mm: two voxels.
@@ -57,7 +57,7 @@ const ON_BONE_MM: f32 = 3.0;
 const FARTHEST_MM: f32 = 150.0;
 
 /// Refuses a point that lies inside the skull or far from it; the bone's surface is at `entry`.
-fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), SessionError> {
+fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), PatientError> {
     let away_mm = Vec3::from(requested).distance(centre) - entry.distance(centre);
     let what = if away_mm < -ON_BONE_MM {
         format!("lies {:.0} mm inside the skull", -away_mm)
@@ -67,7 +67,7 @@ fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), Ses
         return Ok(());
     };
     let [x, y, z] = entry.to_array();
-    Err(SessionError::Case(format!(
+    Err(PatientError::Case(format!(
         "--opening: {requested:?} {what}: give a point outside the skull, over the place to open; on the same line the bone begins at {x:.0},{y:.0},{z:.0} (RAS mm)"
     )))
 }
@@ -96,7 +96,7 @@ impl Opening {
         isovalue_hu: i16,
         brain: Option<&VoxelVolume<u8>>,
         recipe: &Recipe,
-    ) -> Result<Self, SessionError> {
+    ) -> Result<Self, PatientError> {
         let reference = || {
             let (reference, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
             bone_of(reference, isovalue_hu)
@@ -114,13 +114,13 @@ impl Opening {
         reference: &BoneVolume,
         brain: Option<&Inside>,
         requested: Option<[f32; 3]>,
-    ) -> Result<Self, SessionError> {
+    ) -> Result<Self, PatientError> {
         let centre = brain.map_or(reference.bounds().centre(), |brain| brain.middle);
         let head = Surroundings { bone: reference, brain: brain.map(|brain| &brain.field), centre };
         let site = match requested {
             Some(requested) => head.towards((Vec3::from(requested) - centre).normalize_or_zero()).ok_or_else(|| {
                 let what = if brain.is_some() { "bone and then brain" } else { "a wall of bone up to 30 mm thick" };
-                SessionError::Case(format!(
+                PatientError::Case(format!(
                     "--opening: the line from {requested:?} to the centre of the head at {centre:.0} (RAS mm) does not meet {what}: give a point outside the skull, over the place to open"
                 ))
             })?,
@@ -134,12 +134,12 @@ impl Opening {
 
     /// Measures entry, bone thickness and brain depth along the same line on the session's skull.
     /// `with_brain`: whether the case has a brain.
-    pub fn on(self, skull: &BoneVolume, with_brain: bool) -> Result<Self, SessionError> {
+    pub fn on(self, skull: &BoneVolume, with_brain: bool) -> Result<Self, PatientError> {
         let (entry, inward) = (Vec3::from(self.entry_mm), Vec3::from(self.inward));
         let start = -(BEFORE[0] + BEFORE[1] * skull.spacing_mm());
         let end = if with_brain { self.brain_mm } else { self.bone_mm - start };
         let [outer, inner] = search::bone_along(skull, entry, inward, [start, end]).ok_or_else(|| {
-            SessionError::Case(format!(
+            PatientError::Case(format!(
                 "voxels of {} mm contain no bone at the opening {entry:.0} (RAS mm), where it is {:.1} mm thick: give a smaller --spacing-mm, or another place with --opening X,Y,Z",
                 skull.spacing_mm(),
                 self.bone_mm
@@ -184,7 +184,7 @@ fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
 
 /// Finds a place to probe a brain without a skull, on a ray to its centre from above, right and
 /// front.
-pub(crate) fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
+pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
     let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
     let from = centre + search::FAR_MM * outward;
     let depth = search::first(0.0, search::FAR_MM, |t| -brain.sample(from - t * outward))?;
@@ -193,7 +193,7 @@ pub(crate) fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
 
 /// Direction from the site to the camera: slightly from behind and the side, so that hole and tool
 /// are visible.
-pub(crate) fn eye(site: &Site) -> Vec3 {
+pub fn eye(site: &Site) -> Vec3 {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
     outward + 0.45 * side + 0.25 * Vec3::Z

@@ -1,10 +1,10 @@
 //! Prepares a case for contact, drilling and deformation.
 
-use crate::case::opening::{bare_brain, bone_of};
-use crate::case::{Brain, Case};
-use crate::error::SessionError;
+use crate::PatientError;
 use crate::mixture::{self, Shares};
+use crate::opening::{bare_brain, bone_of};
 use crate::tissue_class::TissueClass;
+use crate::{Brain, Case};
 use glam::{DAffine3, IVec3};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
@@ -47,7 +47,7 @@ pub struct RestBrain {
     /// Class code of each tetrahedron, or a larger code for a mixture.
     pub class_of_tet: Vec<u8>,
     /// Shares of the classes in each mixture.
-    pub(crate) mixtures: Vec<Shares>,
+    pub mixtures: Vec<Shares>,
     /// Nodes of its base, which do not move where nothing else holds it.
     pub fixed: Vec<u32>,
     /// Distance to its surface, mm, negative inside.
@@ -62,7 +62,7 @@ pub struct RestBrain {
 
 impl Scene {
     /// Prepares a case for a program.
-    pub fn new(program: Program, case: Case) -> Result<Self, SessionError> {
+    pub fn new(program: Program, case: Case) -> Result<Self, PatientError> {
         let mut remarks = case.notes;
         let bone = || case.skull.map(|skull| bone_of(skull, case.isovalue_hu)).transpose();
         let field = || case.brain.as_ref().map(|brain| DistanceField::of_mask(&brain.classes));
@@ -83,7 +83,7 @@ impl Scene {
                 (Some(_), Some(_)) => "no ray from above meets bone and then brain: give a CT and an MRI of one head, upright and in one space (--register moves the MRI to the CT), or the place with --opening",
                 _ => "no ray from outside meets a wall of bone up to 30 mm thick: is the CT one of a head, and does the isovalue (--isovalue-hu) fit?",
             };
-            SessionError::Case(fault.into())
+            PatientError::Case(fault.into())
         })?;
         Ok(Self { bone, brain, site, fit_png: case.fit_png, remarks })
     }
@@ -154,7 +154,7 @@ fn fixed_by_bone(mesh: &TetMesh, bone: &BoneVolume) -> Vec<u32> {
 }
 
 /// Nodes up to a share of the mesh's height.
-pub(super) fn below(mesh: &TetMesh, share: f32) -> Vec<u32> {
+pub(crate) fn below(mesh: &TetMesh, share: f32) -> Vec<u32> {
     let bounds = mesh.bounds();
     let top = bounds.min.z + share * bounds.size().z;
     (0..mesh.positions.len() as u32).filter(|&node| mesh.positions[node as usize].z <= top).collect()

@@ -1,6 +1,6 @@
 use super::*;
-use crate::case::anatomy::{cropped, make_skull};
-use crate::recipe::Recipe;
+use crate::Recipe;
+use crate::anatomy::{cropped, make_skull};
 use std::path::Path;
 use trepan_volume::{bone_isovalue, hounsfield, largest_component, read};
 
@@ -32,7 +32,7 @@ fn opened(
     ct: &VoxelVolume<i16>,
     mask: Option<&VoxelVolume<u8>>,
     requested: Option<[f32; 3]>,
-) -> Result<Opening, SessionError> {
+) -> Result<Opening, PatientError> {
     Opening::of_patient(&BoneVolume::new(ct, 400).unwrap(), mask.map(Inside::of).as_ref(), requested)
 }
 

@@ -13,14 +13,14 @@
 //! All coordinates are patient RAS+ mm. No file contains a patient's name: images are rewritten
 //! from their voxels, and the case is named by a hash.
 
-use crate::case::cache::digest;
-use crate::case::identity::Identity;
-use crate::case::opening::Opening;
-use crate::case::{Brain, Case};
-use crate::error::SessionError;
+use crate::PatientError;
+use crate::Recipe;
+use crate::cache::digest;
+use crate::identity::Identity;
 use crate::mixture::Shares;
+use crate::opening::Opening;
 use crate::progress::DraftSkull;
-use crate::recipe::Recipe;
+use crate::{Brain, Case};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,7 @@ struct Card {
 }
 
 /// Writes a case into an empty folder.
-pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
+pub fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut names = Vec::new();
     let write_skull = || match &case.skull {
         Some(skull) => nifti::write(&folder.join(SKULL), skull),
@@ -108,13 +108,13 @@ fn write_brain(brain: &Brain, folder: &Path) -> Result<(), Box<dyn Error + Send 
 }
 
 /// Reads the patient's identity from a case folder, without the volumes.
-pub(crate) fn identity(folder: &Path) -> Result<Identity, SessionError> {
+pub fn identity(folder: &Path) -> Result<Identity, PatientError> {
     card(folder).map(|Card { name, hash, images, .. }| Identity { name, case: Some(hash), images })
 }
 
 /// Reads the skull of a case folder for a draft, and where it is opened; `None` without a skull. It
 /// is not checked.
-pub(crate) fn draft_skull(folder: &Path) -> Result<Option<(DraftSkull, Opening)>, SessionError> {
+pub fn draft_skull(folder: &Path) -> Result<Option<(DraftSkull, Opening)>, PatientError> {
     let card = card(folder)?;
     let Some(opening) = card.opening.filter(|_| card.files.contains_key(SKULL)) else { return Ok(None) };
     let volume = nifti::read(&folder.join(SKULL)).map_err(|fault| broken(folder, SKULL, &fault))?;
@@ -123,7 +123,7 @@ pub(crate) fn draft_skull(folder: &Path) -> Result<Option<(DraftSkull, Opening)>
 }
 
 /// Thins a CT to voxels of about 1.5 mm.
-pub(crate) fn in_draft(hu: &VoxelVolume<i16>, isovalue_hu: i16) -> DraftSkull {
+pub fn in_draft(hu: &VoxelVolume<i16>, isovalue_hu: i16) -> DraftSkull {
     let every = hu.spacing_mm().to_array().map(|mm| (DRAFT_MM / mm).round().max(1.0) as usize);
     DraftSkull { hu: thinned(hu, every), isovalue_hu }
 }
@@ -145,7 +145,7 @@ fn thinned(volume: &VoxelVolume<i16>, every: [usize; 3]) -> VoxelVolume<i16> {
 }
 
 /// Reads `case.json`; refuses an unknown format version.
-fn card(folder: &Path) -> Result<Card, SessionError> {
+fn card(folder: &Path) -> Result<Card, PatientError> {
     let json = read_regular(&folder.join(CARD)).map_err(|fault| broken(folder, CARD, &fault))?;
     let card: Card = serde_json::from_slice(&json).map_err(|fault| broken(folder, CARD, &fault))?;
     if card.form != FORM {
@@ -155,12 +155,12 @@ fn card(folder: &Path) -> Result<Card, SessionError> {
     Ok(card)
 }
 
-fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> SessionError {
-    SessionError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
+fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> PatientError {
+    PatientError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
 }
 
 /// Opens a case folder; every file must exist and match its hash.
-pub(crate) fn load(folder: &Path) -> Result<Case, SessionError> {
+pub fn load(folder: &Path) -> Result<Case, PatientError> {
     let card = card(folder)?;
     let broken = |file: &str, fault: &dyn std::fmt::Display| broken(folder, file, fault);
     for (name, hash) in &card.files {

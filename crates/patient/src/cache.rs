@@ -6,9 +6,9 @@
 //! `--cache` or `TREPAN_CACHE` names another folder. Above 8 GB in total the least recently used
 //! folders are removed, but none that was used within the last hour.
 
-use crate::error::SessionError;
-use crate::options::Patient;
+use crate::PatientError;
 use etcetera::{BaseStrategy, choose_base_strategy};
+use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 use std::error::Error;
 use std::fs::{self, File};
@@ -27,18 +27,18 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Cache in the folder that the flags name, else the user's.
-    pub fn of(patient: &Patient) -> Result<Self, SessionError> {
-        patient.cache.clone().map_or_else(Self::of_user, |root| Ok(Self::at(root)))
+    /// Cache in this folder, else the user's.
+    pub fn of(root: Option<PathBuf>) -> Result<Self, PatientError> {
+        root.map_or_else(Self::of_user, |root| Ok(Self::at(root)))
     }
 
     /// The user's cache: `TREPAN_CACHE`, else `trepan/cases` in the platform's cache folder.
-    pub fn of_user() -> Result<Self, SessionError> {
+    pub fn of_user() -> Result<Self, PatientError> {
         if let Some(root) = std::env::var_os("TREPAN_CACHE").filter(|root| !root.is_empty()) {
             return Ok(Self { root: root.into() });
         }
         let strategy = choose_base_strategy()
-            .map_err(|fault| SessionError::Usage(format!("no cache folder ({fault}): set HOME or TREPAN_CACHE")))?;
+            .map_err(|fault| PatientError::Usage(format!("no cache folder ({fault}): set HOME or TREPAN_CACHE")))?;
         Ok(Self { root: strategy.cache_dir().join("trepan").join("cases") })
     }
 
@@ -49,7 +49,7 @@ impl Cache {
 
     /// Key of data derived from these files (folders with all their files) by this recipe, 64
     /// digits.
-    pub fn key(&self, inputs: &[&Path], recipe: &str) -> Result<String, SessionError> {
+    pub fn key(&self, inputs: &[&Path], recipe: &str) -> Result<String, PatientError> {
         digest_of_all(&format!("{FORM} {recipe}"), inputs)
     }
 
@@ -66,6 +66,17 @@ impl Cache {
         // Records the time of the last use for the sweep. It fails for a folder of another user.
         _ = File::open(&folder).and_then(|file| file.set_modified(SystemTime::now()));
         Some(folder)
+    }
+
+    /// Reads a value from a file of a key; `None` if it was never written, or by another version.
+    pub fn read<T: DeserializeOwned>(&self, key: &str, file: &str) -> Option<T> {
+        serde_json::from_slice(&fs::read(self.find(key)?.join(file)).ok()?).ok()
+    }
+
+    /// Writes a value as a file of a key; if that fails, it is computed again next time.
+    pub fn write(&self, value: &impl Serialize, key: &str, file: &str) {
+        let write = |folder: &Path| Ok(fs::write(folder.join(file), serde_json::to_vec(value)?)?);
+        self.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not cached: {fault}"));
     }
 
     /// Fills a temporary folder and moves it to its place; replaces an existing one.
@@ -90,7 +101,7 @@ impl Cache {
 }
 
 /// SHA-256 of a text and of these files (folders with all their files), hexadecimal.
-pub(super) fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
+pub(crate) fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, PatientError> {
     let mut hash = Sha256::new();
     hash.update(text);
     for input in inputs {
@@ -102,7 +113,7 @@ pub(super) fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, Sess
 }
 
 /// SHA-256 of a file's bytes, hexadecimal.
-pub(super) fn digest(file: &Path) -> io::Result<String> {
+pub(crate) fn digest(file: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     feed(&mut hash, &mut open_regular(file)?)?;
     Ok(hexadecimal(hash))
@@ -156,14 +167,14 @@ fn hexadecimal(hash: Sha256) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
+fn unreadable(path: &Path, fault: &io::Error) -> PatientError {
     let remedy = match fault.kind() {
         io::ErrorKind::NotFound => "give the path of a file, or of a folder of DICOM slices, that exists",
         io::ErrorKind::PermissionDenied => "allow reading it",
         io::ErrorKind::Other => "give one regular file, or the folder of one series of DICOM slices",
         _ => "check the file and the disk",
     };
-    SessionError::Usage(format!("cannot read {}: {fault}; {remedy}", path.display()))
+    PatientError::Usage(format!("cannot read {}: {fault}; {remedy}", path.display()))
 }
 
 /// Extensions of images stored in one file.

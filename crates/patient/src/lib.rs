@@ -1,23 +1,53 @@
-//! Builds and opens cases from a patient's files.
+//! A patient's CT and MRI as a case to operate on: skull, brain mesh, planned opening, anchors.
+//!
+//! # Theory
+//! [`Import::begin`](import::Import::begin) reads the images and knows their properties;
+//! [`build`](import::Import::build) makes the case in voxels and tetrahedra that may be chosen in
+//! between. [`Scene::new`](scene::Scene::new) prepares a case for contact, drilling and
+//! deformation. All coordinates are patient RAS+ mm.
+//!
+//! # Practice
+//! Images that contradict each other, or are no head, are refused with the remedy; what looks odd
+//! but can be worked with is a remark. Cases are [cached](cache::Cache) by the content of their
+//! files, and no name of a patient is kept.
+//!
+//! # When not to use it
+//! To read one image: use `trepan-volume`. To mesh one mask: use `trepan-mesh`.
 
-pub(crate) mod anatomy;
-pub(crate) mod anchors;
-pub(crate) mod cache;
-pub(crate) mod choice;
+mod anatomy;
+pub mod anchors;
+pub mod cache;
+mod error;
+pub mod fineness;
 mod fit;
-pub(crate) mod folder;
-pub(crate) mod identity;
-pub(crate) mod import;
-pub(crate) mod opening;
-pub(crate) mod plan;
-pub(crate) mod scene;
+pub mod folder;
+pub mod identity;
+pub mod import;
+pub mod mixture;
+pub mod opening;
+pub mod plan;
+pub mod preview;
+pub mod progress;
+mod recipe;
+pub mod remark;
+pub mod scene;
 mod space;
-mod stages;
+pub mod stages;
+pub mod tissue_class;
 
-use crate::case::opening::Opening;
-use crate::mixture::Shares;
-use crate::recipe::Recipe;
-use crate::tissue_class::TissueSource;
+pub use anatomy::scanned;
+pub use cache::Cache;
+pub use error::PatientError;
+pub use fineness::Fineness;
+pub use import::open as open_case;
+pub use mixture::body_of;
+pub use plan::Plan;
+pub use recipe::Recipe;
+pub use scene::{RestBrain, Scene};
+pub use tissue_class::{TissueClass, TissueSource};
+
+use mixture::Shares;
+use opening::Opening;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use trepan_mesh::TetMesh;
@@ -63,10 +93,20 @@ pub struct Case {
     pub notes: Vec<String>,
 }
 
+impl Case {
+    /// Properties that the choice of models depends on.
+    pub fn facts(&self) -> import::Facts {
+        import::Facts {
+            ct_voxel_mm: self.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
+            brain_mm3: self.brain.as_ref().map(|brain| import::volume_mm3(&brain.classes)),
+        }
+    }
+}
+
 /// The brain of a case.
 #[derive(Clone, Debug)]
 pub struct Brain {
-    /// Codes of [`TissueClass`](crate::TissueClass) on cubic voxels around the brain; 0 outside.
+    /// Codes of [`TissueClass`] on cubic voxels around the brain; 0 outside.
     pub classes: VoxelVolume<u8>,
     /// The MRI on the same grid.
     pub mri: VoxelVolume<f32>,
@@ -77,3 +117,7 @@ pub struct Brain {
     /// Shares of the classes in each mixture.
     pub mixtures: Vec<Shares>,
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

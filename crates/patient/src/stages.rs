@@ -1,17 +1,16 @@
 //! Progress of an import: shows the running stage, and the share of each stage at the end.
 
-use crate::error::SessionError;
-use crate::progress::{DraftSkull, Progress};
-use crate::run::clock::Clock;
+use crate::PatientError;
+use crate::progress::{DraftSkull, Progress, ms_since};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Progress bar that records the duration of each stage.
-pub(crate) struct ImportStages {
+pub struct ImportStages {
     bar: ProgressBar,
     progress: Progress,
-    clock: Clock,
+    start: Instant,
     /// Name and start time of each stage, ms.
     began: Vec<(&'static str, f64)>,
 }
@@ -22,12 +21,12 @@ impl ImportStages {
         let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} {elapsed}");
         let bar = ProgressBar::new(count).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(120));
-        Self { bar, progress: progress.clone(), clock: Clock::start(), began: Vec::new() }
+        Self { bar, progress: progress.clone(), start: Instant::now(), began: Vec::new() }
     }
 
     /// Begins a stage, which ends the one before; an error if loading was cancelled.
-    pub fn next(&mut self, what: &'static str) -> Result<(), SessionError> {
-        self.began.push((what, self.clock.now_ms()));
+    pub fn next(&mut self, what: &'static str) -> Result<(), PatientError> {
+        self.began.push((what, ms_since(self.start)));
         self.bar.inc(1);
         self.bar.set_message(what);
         self.progress.next(what)
@@ -45,7 +44,7 @@ impl ImportStages {
 
     /// Ends the last stage and tells how long all took; the share of each is logged for debugging.
     pub fn finish(self) -> String {
-        let end_ms = self.clock.now_ms();
+        let end_ms = ms_since(self.start);
         self.bar.finish_and_clear();
         tracing::debug!("import: {}", shares(&self.began, end_ms));
         format!("{:.1} s", 1e-3 * end_ms)

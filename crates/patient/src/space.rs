@@ -9,11 +9,11 @@
 //! # When not to use it
 //! To judge a registration: an error of some millimetres passes. Look at the slices for that.
 
-use crate::error::SessionError;
+use crate::PatientError;
 use trepan_volume::{BrainFit, Hidden, StrayBone, TooLarge, VoxelVolume, brain_by_mri, brain_fit, stray_bone};
 
 /// CT that an MRI is compared with.
-pub(crate) struct Space<'a> {
+pub struct Space<'a> {
     /// The CT.
     pub ct: &'a VoxelVolume<i16>,
     /// Its threshold of bone, HU.
@@ -58,7 +58,7 @@ fn is_beyond(fit: &BrainFit, limits: &BrainFit) -> bool {
 impl Space<'_> {
     /// Compares an MRI's brain with the skull; adds remarks if it fits badly or is cut. False if
     /// no brain is found in the MRI alone.
-    pub fn check_mri(&self, mri: &VoxelVolume<f32>, notes: &mut Vec<String>) -> Result<bool, SessionError> {
+    pub fn check_mri(&self, mri: &VoxelVolume<f32>, notes: &mut Vec<String>) -> Result<bool, PatientError> {
         let brain = brain_by_mri(mri).map_err(large)?;
         match &brain {
             Some(brain) => self.check("the MRI's brain", brain, mri, notes)?,
@@ -74,7 +74,7 @@ impl Space<'_> {
         brain: &VoxelVolume<u8>,
         mri: &VoxelVolume<f32>,
         notes: &mut Vec<String>,
-    ) -> Result<(), SessionError> {
+    ) -> Result<(), PatientError> {
         let Some(fit) = brain_fit(brain, mri, self.ct, self.isovalue_hu).map_err(large)? else {
             notes.push(
                 "DOUBTFUL: the CT's bone encloses no space: whether the MRI lies in its space is not checked".into(),
@@ -103,7 +103,7 @@ impl Space<'_> {
         let because = cut.as_ref().map_or_else(String::new, |cut| format!("{cut}, so "));
         if is_beyond(&fit, &APART) {
             let fault = format!("{because}the MRI does not lie in the CT's space: {found}; {remedy}");
-            return Err(SessionError::Case(fault));
+            return Err(PatientError::Case(fault));
         }
         if is_beyond(&fit, &DOUBTFUL) {
             notes.push(format!("{because}the MRI may not lie in the CT's space: {found}; {remedy}"));
@@ -128,7 +128,7 @@ impl Space<'_> {
     }
 
     /// Remarks on bone inside a brain and on metal around it.
-    pub fn stray(&self, brain: &VoxelVolume<u8>) -> Result<Vec<String>, SessionError> {
+    pub fn stray(&self, brain: &VoxelVolume<u8>) -> Result<Vec<String>, PatientError> {
         let StrayBone { inside_ml, metal_ml, frame_ml } =
             stray_bone(brain, self.ct, self.isovalue_hu).map_err(large)?;
         let inside = (inside_ml > STRAY_ML || metal_ml > METAL_ML).then(|| {
@@ -154,8 +154,8 @@ const METAL_ML: f64 = 0.02;
 /// Metal around a head without a remark, ml.
 const FRAME_ML: f64 = 1.0;
 
-fn large(fault: TooLarge) -> SessionError {
-    SessionError::Case(format!("{fault}; crop the images, or correct their voxel edges"))
+fn large(fault: TooLarge) -> PatientError {
+    PatientError::Case(format!("{fault}; crop the images, or correct their voxel edges"))
 }
 
 #[cfg(test)]

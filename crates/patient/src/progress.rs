@@ -1,18 +1,18 @@
 //! Progress of loading a session, for other threads to read, and to cancel.
 
-use crate::error::SessionError;
-use crate::run::clock::Clock;
+use crate::PatientError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 use trepan_volume::VoxelVolume;
 
 /// A stage of loading: its name and when it began, ms since loading began.
-pub(crate) type Stage = (&'static str, f64);
+pub type Stage = (&'static str, f64);
 
 /// A skull that is only looked at, in coarse voxels.
 #[derive(Debug)]
-pub(crate) struct DraftSkull {
+pub struct DraftSkull {
     /// Densities, HU.
     pub hu: VoxelVolume<i16>,
     /// Threshold of bone, HU.
@@ -21,11 +21,11 @@ pub(crate) struct DraftSkull {
 
 /// Progress of loading; clones share it.
 #[derive(Clone, Debug)]
-pub(crate) struct Progress(Arc<Shared>);
+pub struct Progress(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
-    clock: Clock,
+    start: Instant,
     stages: Mutex<Vec<Stage>>,
     cancelled: AtomicBool,
     running: AtomicBool,
@@ -35,15 +35,15 @@ struct Shared {
 impl Default for Progress {
     fn default() -> Self {
         let (cancelled, running, draft) = Default::default();
-        Self(Arc::new(Shared { clock: Clock::start(), stages: Mutex::default(), cancelled, running, draft }))
+        Self(Arc::new(Shared { start: Instant::now(), stages: Mutex::default(), cancelled, running, draft }))
     }
 }
 
 impl Progress {
     /// Begins a stage, which ends the one before; an error if loading was cancelled.
-    pub fn next(&self, what: &'static str) -> Result<(), SessionError> {
-        self.lock().push((what, self.0.clock.now_ms()));
-        if self.0.cancelled.load(Ordering::Relaxed) { Err(SessionError::Cancelled) } else { Ok(()) }
+    pub fn next(&self, what: &'static str) -> Result<(), PatientError> {
+        self.lock().push((what, ms_since(self.0.start)));
+        if self.0.cancelled.load(Ordering::Relaxed) { Err(PatientError::Cancelled) } else { Ok(()) }
     }
 
     /// Ends loading at its next stage.
@@ -53,7 +53,7 @@ impl Progress {
 
     /// Ends the last stage: the session runs.
     pub fn run(&self) {
-        self.lock().push((RUNNING, self.0.clock.now_ms()));
+        self.lock().push((RUNNING, ms_since(self.0.start)));
         self.end_wait();
         self.0.running.store(true, Ordering::Relaxed);
     }
@@ -92,7 +92,7 @@ impl Progress {
 
     /// Returns the stages so far, and the time since loading began, ms.
     pub fn so_far(&self) -> (Vec<Stage>, f64) {
-        (self.lock().clone(), self.0.clock.now_ms())
+        (self.lock().clone(), ms_since(self.0.start))
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Stage>> {
@@ -100,8 +100,13 @@ impl Progress {
     }
 }
 
+/// Time since an instant, ms.
+pub(crate) fn ms_since(start: Instant) -> f64 {
+    1e3 * start.elapsed().as_secs_f64()
+}
+
 /// Name of the last stage, in which the session runs.
-pub(crate) const RUNNING: &str = "running";
+pub const RUNNING: &str = "running";
 
 #[cfg(test)]
 mod tests {
@@ -116,7 +121,7 @@ mod tests {
         progress.next("reading the CT").unwrap();
         assert!(!other.is_running());
         other.cancel();
-        assert!(matches!(progress.next("meshing the brain"), Err(SessionError::Cancelled)));
+        assert!(matches!(progress.next("meshing the brain"), Err(PatientError::Cancelled)));
         progress.run();
         assert!(other.is_running());
         assert_eq!(

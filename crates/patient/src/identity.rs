@@ -5,21 +5,21 @@
 //! Recordings of older versions contain the case's hash only: then the name may identify the
 //! patient, or the patient is unknown.
 
-use crate::case::Inputs;
-use crate::case::cache::digest_of_all;
-use crate::error::SessionError;
-use crate::recipe::Recipe;
+use crate::Inputs;
+use crate::PatientError;
+use crate::Recipe;
+use crate::cache::digest_of_all;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
 
 /// Name prefix of users' own cases; digits of the hash follow.
-pub(super) const USERS: &str = "case-";
+pub const USERS: &str = "case-";
 /// Key of the case's hash in a header.
 const CASE: &str = "case";
 
 /// Identity of a patient.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Identity {
+pub struct Identity {
     /// Name of the case; empty if unknown.
     pub name: String,
     /// Hash of the case built from the images, if known.
@@ -76,7 +76,7 @@ impl Identity {
 }
 
 /// Hash of each of the patient's images, by `ct` and `mri`.
-pub(super) fn images(inputs: &Inputs, recipe: &Recipe) -> Result<BTreeMap<String, String>, SessionError> {
+pub fn images(inputs: &Inputs, recipe: &Recipe) -> Result<BTreeMap<String, String>, PatientError> {
     let images = [("ct", &inputs.ct, recipe.ct_series), ("mri", &inputs.mri, recipe.mri_series)];
     let given = images.into_iter().filter_map(|(name, path, series)| Some((name, path.as_deref()?, series)));
     given.map(|(name, path, series)| Ok((name.into(), digest_of_all(&format!("{series:?}"), &[path])?))).collect()

@@ -12,7 +12,7 @@ use trepan_mesh::lattice::LabelledMesh;
 use trepan_soft::{Body, Bound, Material, Membrane};
 
 /// Shares of a volume by class, in the order of [`TissueClass::ALL`].
-pub(crate) type Shares = [f32; TissueClass::ALL.len()];
+pub type Shares = [f32; TissueClass::ALL.len()];
 
 /// Most mixtures beside the classes: codes are bytes, and 0 is no code.
 const MOST: usize = 255 - TissueClass::ALL.len();
@@ -20,10 +20,10 @@ const MOST: usize = 255 - TissueClass::ALL.len();
 /// all tetrahedra have the mean of all.
 const STEPS: [f32; 9] = [32.0, 16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0];
 /// How the moduli of classes make those of a mixture in a session.
-pub(crate) const BOUND: Bound = Bound::HashinShtrikman;
+pub const BOUND: Bound = Bound::HashinShtrikman;
 
 /// The code of each tetrahedron of a mesh whose labels are class codes, and the mixtures.
-pub(crate) fn codes(labelled: &LabelledMesh) -> (Vec<u8>, Vec<Shares>) {
+pub fn codes(labelled: &LabelledMesh) -> (Vec<u8>, Vec<Shares>) {
     let mut codes: Vec<u8> = labelled.label_of_tet.iter().map(|label| *label as u8).collect();
     let mut of_tets: Vec<(usize, Shares)> = Vec::new();
     for of_tet in labelled.shares.chunk_by(|a, b| a.tet == b.tet) {
@@ -70,7 +70,7 @@ pub fn body_of(labelled: &LabelledMesh, of_classes: Vec<Material>, bound: Bound,
 }
 
 /// The materials of the classes, then those of the mixtures.
-pub(crate) fn materials(mut of_classes: Vec<Material>, mixtures: &[Shares], bound: Bound) -> Vec<Material> {
+pub fn materials(mut of_classes: Vec<Material>, mixtures: &[Shares], bound: Bound) -> Vec<Material> {
     for shares in mixtures {
         let parts = shares.iter().zip(&of_classes).filter(|(share, _)| **share > 0.0);
         let parts: Vec<(f64, Material)> = parts.map(|(share, material)| (f64::from(*share), *material)).collect();
