@@ -131,7 +131,7 @@ impl CutField {
 
 /// Index of a node in its brick.
 #[inline]
-fn within(node: IVec3) -> usize {
+pub(crate) fn within(node: IVec3) -> usize {
     let v = node & (BRICK as i32 - 1);
     v.x as usize + BRICK * (v.y as usize + BRICK * v.z as usize)
 }

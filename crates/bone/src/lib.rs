@@ -36,6 +36,7 @@ mod between;
 mod cut;
 mod flap;
 mod piece;
+mod scanned;
 mod stroke;
 mod undo;
 
@@ -45,6 +46,7 @@ pub use flap::{FlapSearch, FlapState};
 pub use piece::Piece;
 pub use stroke::{BRICK, MAX_STROKE_BRICKS, MAX_STROKES, Undone};
 
+use crate::scanned::Scanned;
 use crate::stroke::Strokes;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
@@ -75,6 +77,7 @@ pub struct BoneVolume {
     /// Whether a brick has ever held bone.
     solid: Vec<AtomicBool>,
     strokes: Strokes,
+    scanned: Scanned,
     /// Number of times that bone was restored.
     undone: AtomicU32,
 }
@@ -125,6 +128,7 @@ impl BoneVolume {
             cut_versions: counters(),
             solid: (0..bricks.iter().product()).map(|_| AtomicBool::new(false)).collect(),
             strokes: Strokes::new(0),
+            scanned: Scanned::new(bricks.iter().product()),
             undone: AtomicU32::new(0),
         };
         bone.bounds = bone.find_bone().ok_or(BoneError::Empty(isovalue))?;
@@ -305,12 +309,12 @@ impl BoneVolume {
     /// Sets the CT's density of a voxel, HU; ignored outside the grid. For the writer only.
     pub fn set_hu(&self, voxel: IVec3, hu: i16) {
         if let Some(at) = self.index(voxel) {
-            let brick = self.brick_of(voxel);
+            let (brick, low) = (self.brick_of(voxel), self.low_of(self.brick_of(voxel)));
+            self.scanned.keep(brick, |n| self.ct(low + Self::within(n)));
             if self.strokes.is_first(brick) {
-                let low = self.low_of(brick);
                 self.strokes.keep(brick, |n| self.ct(low + Self::within(n)));
             }
-            self.hu[at].store(hu, Ordering::Relaxed);
+            self.hu[at].store(hu, Ordering::Release);
             if hu >= self.isovalue {
                 self.solid[brick].store(true, Ordering::Relaxed);
             }

@@ -29,7 +29,7 @@ use std::error::Error;
 use std::path::Path;
 use std::{fs, io};
 use trepan_mesh::{lattice::LabelledMesh, vtk};
-use trepan_volume::{VoxelVolume, hounsfield, nifti, read_regular};
+use trepan_volume::{Sample, VoxelVolume, nifti, read_regular};
 
 /// Version of the folder's format.
 const FORM: u32 = 7;
@@ -117,9 +117,7 @@ pub fn identity(folder: &Path) -> Result<Identity, PatientError> {
 pub fn draft_skull(folder: &Path) -> Result<Option<(DraftSkull, Opening)>, PatientError> {
     let card = card(folder)?;
     let Some(opening) = card.opening.filter(|_| card.files.contains_key(SKULL)) else { return Ok(None) };
-    let volume = nifti::read(&folder.join(SKULL)).map_err(|fault| broken(folder, SKULL, &fault))?;
-    let hu = hounsfield(&volume).map_err(|fault| broken(folder, SKULL, &fault))?;
-    Ok(Some((in_draft(&hu, card.isovalue_hu), opening)))
+    Ok(Some((in_draft(&volume(folder, SKULL)?, card.isovalue_hu), opening)))
 }
 
 /// Thins a CT to voxels of about 1.5 mm.
@@ -159,6 +157,10 @@ fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> PatientEr
     PatientError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
 }
 
+fn volume<T: Sample>(folder: &Path, name: &str) -> Result<VoxelVolume<T>, PatientError> {
+    nifti::read_as(&folder.join(name)).map_err(|fault| broken(folder, name, &fault))
+}
+
 /// Opens a case folder; every file must exist and match its hash.
 pub fn load(folder: &Path) -> Result<Case, PatientError> {
     let card = card(folder)?;
@@ -169,19 +171,15 @@ pub fn load(folder: &Path) -> Result<Case, PatientError> {
             return Err(broken(name, &"the file is not what it was when the case was built"));
         }
     }
-    let volume = |name: &str| nifti::read(&folder.join(name)).map_err(|fault| broken(name, &fault));
-    let skull = match card.files.contains_key(SKULL) {
-        true => Some(hounsfield(&volume(SKULL)?).map_err(|fault| broken(SKULL, &fault))?),
-        false => None,
-    };
+    let skull = card.files.contains_key(SKULL).then(|| volume(folder, SKULL)).transpose()?;
     let brain = match card.files.contains_key(MESH) {
         true => {
-            let classes = volume(MASK)?.map(|v| v as u8);
+            let classes = volume(folder, MASK)?;
             let labelled = vtk::read_labelled(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?;
             let class_of_tet = labelled.label_of_tet.iter().map(|&label| label as u8).collect();
             Some(Brain {
                 classes,
-                mri: volume(MRI)?,
+                mri: volume(folder, MRI)?,
                 mesh: labelled.mesh,
                 class_of_tet,
                 mixtures: card.mixtures.clone(),

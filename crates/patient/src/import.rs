@@ -322,17 +322,24 @@ fn build(
     let (made, classes) = (made?, classes?);
     notes.extend(made.as_ref().and_then(|(_, islands)| loose(islands)));
     notes.append(&mut of_classes);
-    let skull = made.map(|(skull, _)| skull);
     stages.next("planning the opening")?;
-    let on_skull = |(ct, skull): (_, &VoxelVolume<i16>)| match known {
-        Some(opening) => opening.on(&bone_of(skull.clone(), isovalue_hu)?, classes.is_some()),
-        None => Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe),
+    let on_skull = |(ct, (skull, _)): (_, (VoxelVolume<i16>, _))| {
+        let world_from_voxel = skull.world_from_voxel;
+        // The skull is bone for as long as the opening is planned: no second copy of it.
+        let bone = bone_of(skull, isovalue_hu)?;
+        let opening = match known {
+            Some(opening) => opening.on(&bone, classes.is_some()),
+            None => Opening::planned(ct, &bone, isovalue_hu, classes.as_ref(), recipe),
+        };
+        let opening = match opening {
+            // A program that does not drill needs no opening.
+            Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
+            found => Some(found?),
+        };
+        Ok::<_, PatientError>((VoxelVolume { world_from_voxel, ..bone.into_scanned() }, opening))
     };
-    let opening = match ct.as_ref().zip(skull.as_ref()).map(on_skull).transpose() {
-        // A program that does not drill needs no opening.
-        Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
-        found => found?,
-    };
+    let (skull, opening) = ct.as_ref().zip(made).map(on_skull).transpose()?.unzip();
+    let opening = opening.flatten();
     drop(ct);
     stages.next("meshing the brain")?;
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));

@@ -14,7 +14,6 @@ use glam::Vec2;
 use trepan_bone::{BoneVolume, FlapSearch};
 use trepan_geometry::{Quat, Vec3};
 use trepan_haptics::script::{Rim, Site};
-use trepan_volume::VoxelVolume;
 
 /// Points of an outline.
 const RIMS: usize = 48;
@@ -127,12 +126,10 @@ impl Plan {
         self.takes(place) && normal.dot(self.site.inward) < 0.0
     }
 
-    /// The voxels of a skull that are planned to be removed, in their order.
-    pub fn of(&self, skull: &VoxelVolume<i16>, isovalue: i16) -> Vec<usize> {
-        let [nx, ny, _] = skull.dims;
-        let place = |at: usize| skull.centre_of([at % nx, at / nx % ny, at / (nx * ny)]).as_vec3();
-        let bone = skull.data.iter().enumerate().filter(|(_, hu)| **hu >= isovalue);
-        bone.map(|(at, _)| at).filter(|at| self.takes(place(*at))).collect()
+    /// The voxels of a skull as scanned that are planned to be removed, in their order.
+    pub fn of(&self, skull: &BoneVolume) -> Vec<usize> {
+        let bone = skull.scanned_bone().filter(|(_, voxel)| self.takes(skull.centre_of(*voxel)));
+        bone.map(|(at, _)| at).collect()
     }
 }
 
@@ -173,6 +170,7 @@ fn rim(bone: &BoneVolume, place: Vec3, inward: Vec3) -> Option<Rim> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use trepan_volume::VoxelVolume;
 
     /// A round vault: bone from 80 to 86 mm.
     fn vault() -> BoneVolume {
@@ -197,7 +195,7 @@ mod tests {
             assert!((rim.bone_mm - 6.1).abs() < 1.2, "{rim:?}");
             assert!(((rim.outer - site.entry).reject_from(outward).length() - 15.0).abs() < 1e-3);
         }
-        let planned = plan.of(&bone.snapshot(), 400).len() as f32;
+        let planned = plan.of(&bone).len() as f32;
         assert!((planned / (std::f32::consts::PI * 16.2f32.powi(2) * 6.1) - 1.0).abs() < 0.06, "{planned}");
         let hole = Plan::new(Some(&bone), site, 3.0, 0.0).unwrap();
         assert!(hole.takes(site.entry) && !hole.takes(site.entry + 4.0 * Vec3::Z));
@@ -226,7 +224,7 @@ mod tests {
         let place = |x, y| on_skull(x, y) - 2.0 * outward;
         assert!(plan.takes(place(18.0, 0.0)) && !plan.takes(place(0.0, 18.0)) && plan.takes(place(0.0, 10.0)));
         assert!((plan.beside_mm(place(0.0, 18.0)) - 6.0).abs() < 0.5);
-        let planned = plan.of(&bone.snapshot(), 400).len() as f32;
+        let planned = plan.of(&bone).len() as f32;
         assert!((planned / (std::f32::consts::PI * 20.5 * 12.6 * 6.1) - 1.0).abs() < 0.1, "{planned}");
         let eight: Vec<Vec3> = (0..40)
             .map(|n| n as f32 / 40.0 * std::f32::consts::TAU)

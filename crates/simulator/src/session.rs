@@ -196,7 +196,7 @@ impl Session {
     /// Runs the session and writes its files; on failure no partly written file remains.
     pub fn run(mut self) -> Result<SessionResult, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let (before, whole) = (self.setup.pieces(), self.whole());
+        let before = self.setup.pieces();
         let (options, plan, rate_hz) = (&self.options, &self.setup.plan, self.setup.operation.rate_hz);
         let hand = OpenDevice::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
         let second = match &self.second {
@@ -220,7 +220,7 @@ impl Session {
         company.watching.clone_from(&watching);
         let recorder = Recorder::create(&record, &header)?;
         let scene = match self.recording {
-            None => Some((self.film(whole.clone(), None), SceneWriter::create(&output::scene_of(&record), &header)?)),
+            None => Some((self.film(None), SceneWriter::create(&output::scene_of(&record), &header)?)),
             Some(_) => None,
         };
         self.place.progress.next("preparing the picture")?;
@@ -236,7 +236,7 @@ impl Session {
         let ended = watching.and_then(|watching| watching.ended());
         ended.iter().for_each(|text| tracing::info!("{text}"));
         let recording = Recording::open(&record)?;
-        self.map(&mut album, whole.as_deref(), &recording);
+        self.map(&mut album, &recording);
         let mut remarks = self.setup.scene.remarks.clone();
         remarks.extend(self.setup.models.unmet.iter().cloned());
         let (lack, unlike) = self.replay_remarks();
@@ -245,18 +245,16 @@ impl Session {
         remarks.extend(graphics.err().map(|why| why.to_string()));
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
-        let drilled =
-            self.setup.bone().zip(whole.as_deref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
+        let drilled = self.setup.bone().map(|bone| self.drilled(bone, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let around = self.setup.bone().zip(whole.as_deref()).filter(|_| self.options.drilled_fine);
-        let around = around.and_then(|(bone, whole)| drilled::on_nodes_around(whole, bone));
-        let bone_before = self.setup.bone().zip(whole);
+        let around = self.setup.bone().filter(|_| self.options.drilled_fine);
+        let around = around.and_then(|bone| drilled::on_nodes_around(bone));
         let summary = Summary {
             date,
             length_s: recording.ticks.last().map_or(0.0, |tick| 1e-3 * tick.time_ms),
             removed_label: drilled.as_ref().map(Drilled::label),
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
-            plan: bone_before.and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
+            plan: self.setup.bone().and_then(|bone| PlanComparison::of(&self.setup.plan, bone)),
             regions: self.setup.regions(&recording),
             remarks,
             machine: Machine::here(adapter),
@@ -320,15 +318,15 @@ impl Session {
 
     /// Current skull in the scanner's voxels; in those of the case, with a remark, if the CT is not
     /// available.
-    fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> Drilled {
+    fn drilled(&self, bone: &BoneVolume, remarks: &mut Vec<String>) -> Drilled {
         let why = match patient::scanned(&self.inputs, self.options.patient.ct_series) {
-            Some(Ok(ct)) => return drilled::drilled(ct, whole, bone),
+            Some(Ok(ct)) => return drilled::drilled(ct, bone),
             Some(Err(fault)) => format!("the CT cannot be read again: {fault}"),
             None => "a case folder does not hold the scanner's images".into(),
         };
         let edge = bone.spacing_mm();
         remarks.push(format!("drilled.nii.gz has voxels of {edge} mm instead of the scanner's: {why}"));
-        drilled::drilled(whole.clone(), whole, bone)
+        drilled::drilled(bone.scanned_volume(), bone)
     }
 
     /// The patient's current scene.
@@ -389,7 +387,7 @@ impl Session {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
-                let film = self.windowed().then(|| self.film(self.whole(), Some(length_ms)));
+                let film = self.windowed().then(|| self.film(Some(length_ms)));
                 lockstep::run(run, (recording, end_ms), film, picture)
             }
             (None, Some(devices)) => threads::run(run, devices, self.pace(), picture),
@@ -397,15 +395,10 @@ impl Session {
         }
     }
 
-    /// The skull's densities before anything is drilled.
-    fn whole(&self) -> Option<Arc<VoxelVolume<i16>>> {
-        self.setup.bone().map(|bone| Arc::new(bone.snapshot()))
-    }
-
     /// The film of the session's brain and of its skull, which nobody has drilled yet.
-    fn film(&self, whole: Option<Arc<VoxelVolume<i16>>>, length_ms: Option<f64>) -> Filming {
+    fn film(&self, length_ms: Option<f64>) -> Filming {
         let rest = self.setup.scene.brain.as_ref().map(|brain| brain.mesh.positions.clone()).unwrap_or_default();
-        Filming::new(self.setup.bone().cloned().zip(whole), rest, length_ms)
+        Filming::new(self.setup.bone().cloned(), rest, length_ms)
     }
 
     /// Limits of a hand's device; the recorded ones, if none is open. A watcher's bone gives way as
@@ -477,13 +470,13 @@ impl Session {
 
     /// Inserts sharp pictures of the opening and of faults, and the final colour maps, before the
     /// session's pictures.
-    fn map(&self, album: &mut Album, before: Option<&VoxelVolume<i16>>, recording: &Recording) {
+    fn map(&self, album: &mut Album, recording: &Recording) {
         let Some(painter) = &mut album.painter else { return };
         let folder = self.out.join("frames");
         // In a window the pictures of the session are as coarse as its frame rate wants.
         let sharp = painter.set_quality(false, 1.0).map_err(SessionError::from).map(|()| {
             let close = self.setup.close_pictures(painter, recording, &folder);
-            close.into_iter().chain(self.setup.maps(painter, before, recording, &folder)).collect::<Vec<_>>()
+            close.into_iter().chain(self.setup.maps(painter, recording, &folder)).collect::<Vec<_>>()
         });
         let of_session = std::mem::take(&mut album.shots);
         match sharp {

@@ -1,12 +1,12 @@
 //! Notes of a reader about a file that it could read.
 
-use crate::VoxelVolume;
+use crate::{Sample, VoxelVolume};
 
 /// A volume with its reader's notes.
 #[derive(Clone, Debug)]
-pub struct Import {
+pub struct Import<T = f32> {
     /// The volume.
-    pub volume: VoxelVolume<f32>,
+    pub volume: VoxelVolume<T>,
     /// Notes for the user; empty for an ordinary file.
     pub notes: Vec<Note>,
     /// CT, MR or another modality's two letters, where the format says it (DICOM).
@@ -103,9 +103,9 @@ pub enum Note {
     },
 }
 
-impl Import {
-    pub(crate) fn new(volume: VoxelVolume<f32>, mut notes: Vec<Note>) -> Self {
-        let count = volume.data.iter().filter(|v| !v.is_finite()).count();
+impl<T: Sample> Import<T> {
+    pub(crate) fn new(volume: VoxelVolume<T>, mut notes: Vec<Note>) -> Self {
+        let count = volume.data.iter().filter(|v| !v.to_f32().is_finite()).count();
         if count > 0 {
             notes.push(Note::NotANumber { count });
         }

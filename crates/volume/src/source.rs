@@ -5,7 +5,7 @@
 //! length times deflate's limit of 1032. Larger requests are rejected before allocation, and memory
 //! grows only with the data received.
 
-use crate::sample::{ByteOrder, Number, Scale};
+use crate::sample::{ByteOrder, Number, Sample, Scale};
 use crate::{Note, ReadError, VoxelVolume, open_regular, room_for_voxels};
 use flate2::bufread::GzDecoder;
 use flate2::read::ZlibDecoder;
@@ -228,15 +228,15 @@ impl Source {
         Ok(())
     }
 
-    /// Decodes the `count` numbers of one volume of several.
-    pub fn samples(
+    /// Decodes the `count` numbers of one volume of several, a part at a time.
+    pub fn samples<T: Sample>(
         &mut self,
         part: Part,
         count: u64,
         number: Number,
         order: ByteOrder,
         scale: Scale,
-    ) -> Result<Vec<f32>, ReadError> {
+    ) -> Result<Vec<T>, ReadError> {
         let needed = count.saturating_mul(part.of).saturating_mul(number.bytes() as u64);
         if needed > self.left {
             return Err(self.truncated("voxels", needed, self.left));
@@ -250,6 +250,7 @@ impl Source {
             values.reserve_exact(count as usize);
         }
         let mut buffer = vec![0; CHUNK.min(needed as usize)];
+        let mut decoded = Vec::with_capacity(buffer.len() / number.bytes());
         let mut left = needed;
         let mut first = 0;
         while left > 0 {
@@ -259,9 +260,10 @@ impl Source {
                 return Err(self.truncated("voxels", needed, needed - left + got as u64));
             }
             grow(&mut values, wanted / number.bytes(), count as usize);
-            let known = values.len();
-            number.decode(&buffer[..wanted], order, scale, &mut values);
-            part.keep(&mut values, known, first);
+            decoded.clear();
+            number.decode(&buffer[..wanted], order, scale, &mut decoded);
+            part.keep(&mut decoded, first);
+            values.extend(decoded.iter().map(|&value| T::from_f32(value)));
             first += (wanted / number.bytes()) as u64;
             left -= wanted as u64;
         }
@@ -304,13 +306,13 @@ impl Source {
     }
 
     /// Checks an affine and assembles the volume.
-    pub fn volume(
+    pub fn volume<T>(
         &self,
         dims: [i64; 3],
-        data: Vec<f32>,
+        data: Vec<T>,
         field: &'static str,
         world_from_voxel: DAffine3,
-    ) -> Result<VoxelVolume<f32>, ReadError> {
+    ) -> Result<VoxelVolume<T>, ReadError> {
         check_affine(&self.file, field, world_from_voxel)?;
         Ok(VoxelVolume { dims: dims.map(|n| n as usize), data, world_from_voxel })
     }
@@ -350,17 +352,11 @@ impl Part {
         Ok((Self { run, of, chosen }, (of > 1).then_some(note)))
     }
 
-    /// Drops what belongs to other volumes from `values[known..]`, the first being number `first`.
-    pub fn keep(self, values: &mut Vec<f32>, known: usize, first: u64) {
+    /// Drops what belongs to other volumes from values, the first being number `first`.
+    pub fn keep(self, values: &mut Vec<f32>, first: u64) {
         if self.of > 1 {
-            let mut end = known;
-            for at in known..values.len() {
-                if (first + (at - known) as u64) / self.run % self.of == self.chosen {
-                    values[end] = values[at];
-                    end += 1;
-                }
-            }
-            values.truncate(end);
+            let mut numbers = first..;
+            values.retain(|_| numbers.next().is_some_and(|n| n / self.run % self.of == self.chosen));
         }
     }
 }
@@ -392,7 +388,7 @@ pub(crate) fn shown(found: &str) -> String {
 }
 
 /// Reserves room for `more` values: doubles the capacity, up to `limit` in all.
-fn grow(values: &mut Vec<f32>, more: usize, limit: usize) {
+fn grow<T>(values: &mut Vec<T>, more: usize, limit: usize) {
     if values.capacity() - values.len() < more {
         let wanted = (2 * values.len()).max(values.len() + more).min(limit.max(values.len() + more));
         values.reserve_exact(wanted - values.len());

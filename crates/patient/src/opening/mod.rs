@@ -92,7 +92,7 @@ impl Opening {
     /// depend on that skull's voxels.
     pub fn planned(
         ct: &VoxelVolume<i16>,
-        skull: &VoxelVolume<i16>,
+        skull: &BoneVolume,
         isovalue_hu: i16,
         brain: Option<&VoxelVolume<u8>>,
         recipe: &Recipe,
@@ -101,10 +101,9 @@ impl Opening {
             let (reference, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
             bone_of(reference, isovalue_hu)
         };
-        let here = || (brain.map(Inside::of), bone_of(skull.clone(), isovalue_hu));
-        let (reference, (inside, skull)) = rayon::join(reference, here);
+        let (reference, inside) = rayon::join(reference, || brain.map(Inside::of));
         let opening = Self::of_patient(&reference?, inside.as_ref(), recipe.opening)?;
-        opening.on(&skull?, brain.is_some())
+        opening.on(skull, brain.is_some())
     }
 
     /// Chooses where to open a patient's skull, on voxels of 1 mm (`REFERENCE_MM`). The place lies

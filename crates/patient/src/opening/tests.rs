@@ -120,7 +120,7 @@ fn on_every_preset(ct: &Path, brain: &Path, requested: Option<[f32; 3]>) -> Vec<
     let on = |spacing_mm| {
         let recipe = Recipe { spacing_mm, opening: requested, ..recipe() };
         let (skull, _) = make_skull(&ct, &recipe, isovalue).unwrap();
-        Opening::planned(&ct, &skull, isovalue, Some(&classes), &recipe).unwrap()
+        Opening::planned(&ct, &bone_of(skull, isovalue).unwrap(), isovalue, Some(&classes), &recipe).unwrap()
     };
     [0.5, 0.75, 1.0, 1.5].map(on).to_vec()
 }

@@ -54,12 +54,12 @@ impl Drilled {
     }
 }
 
-/// Removes from a CT the bone that was removed since `before`.
-pub(crate) fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Drilled {
+/// Removes from a CT the bone that was removed since it was scanned.
+pub(crate) fn drilled(mut ct: VoxelVolume<i16>, bone: &BoneVolume) -> Drilled {
     let mut removed = VoxelVolume::filled(ct.dims, ct.world_from_voxel, 0u8);
-    let Some((low, high)) = gone_box(before, bone) else { return Drilled { densities: ct, removed } };
+    let Some((low, high)) = gone_box(bone) else { return Drilled { densities: ct, removed } };
     let part = Part::of(&ct, low, high);
-    let mut shares: Vec<Option<f32>> = part.voxels().map(|voxel| share(&ct, voxel, before, bone)).collect();
+    let mut shares: Vec<Option<f32>> = part.voxels().map(|voxel| share(&ct, voxel, bone)).collect();
     spread(&ct, &part, &mut shares);
     for (voxel, share) in part.voxels().zip(shares) {
         let at = ct.index(voxel.to_array());
@@ -76,9 +76,9 @@ pub(crate) fn on_nodes(bone: &BoneVolume) -> VoxelVolume<i16> {
     nodes_within(bone, IVec3::ZERO, bone.cut_nodes() * (IVec3::from(bone.dims().map(|n| n as i32)) - 1))
 }
 
-/// The same around the bone that was removed since `before`; `None` if nothing was.
-pub(crate) fn on_nodes_around(before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<VoxelVolume<i16>> {
-    let (low, high) = gone_box(before, bone)?;
+/// The same around the bone that was removed; `None` if nothing was.
+pub(crate) fn on_nodes_around(bone: &BoneVolume) -> Option<VoxelVolume<i16>> {
+    let (low, high) = gone_box(bone)?;
     let node = |place: DVec3| bone.node_at(place.as_vec3()).round().as_ivec3();
     let last = bone.cut_nodes() * (IVec3::from(bone.dims().map(|n| n as i32)) - 1);
     let (low, high) = (node(low - MARGIN_MM), node(high + MARGIN_MM));
@@ -138,31 +138,31 @@ fn is_cut(bone: &BoneVolume, point: Vec3) -> bool {
 }
 
 /// Returns the world corners of a box around the removed bone, mm; `None` if nothing was removed.
-fn gone_box(before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<(DVec3, DVec3)> {
-    let [nx, ny, _] = before.dims;
+fn gone_box(bone: &BoneVolume) -> Option<(DVec3, DVec3)> {
+    let [nx, ny, nz] = bone.dims().map(|n| n as i32);
     let (nodes, half) = (bone.cut_nodes(), (bone.cut_nodes() + 1) / 2);
-    let is_gone = |at: usize, place: IVec3| {
+    let is_gone = |place: IVec3| {
         let node = nodes * place;
         let near =
             (-half..=half).flat_map(|z| (-half..=half).flat_map(move |y| (-half..=half).map(move |x| (x, y, z))));
         let cut = bone.is_cut_near(node - half, node + half)
             && near.into_iter().any(|offset| cut_depth(bone.cut_at(node + IVec3::from(offset))) >= 0.0);
-        is_gone(before.data[at], bone.ct(place), cut, bone.isovalue()) == Some(true)
+        is_gone(bone.scanned(place), bone.ct(place), cut, bone.isovalue()) == Some(true)
     };
     // Bone that was not cut is gone where the CT differs.
-    let in_row = |(row, was): (usize, &[i16])| {
-        let start = IVec3::new(0, (row % ny) as i32, (row / ny) as i32);
-        let (low, high) = (nodes * start - half, nodes * start.with_x(nx as i32 - 1) + half);
+    let in_row = |row: i32| {
+        let start = IVec3::new(0, row % ny, row / ny);
+        let (low, high) = (nodes * start - half, nodes * start.with_x(nx - 1) + half);
         let near = bone.is_cut_near(low, high);
         let is_gone = |x: &i32| {
             let place = start.with_x(*x);
-            (near || was[*x as usize] != bone.ct(place)) && is_gone(row * nx + *x as usize, place)
+            (near || bone.scanned(place) != bone.ct(place)) && is_gone(place)
         };
-        let first = (0..nx as i32).find(is_gone)?;
-        let last = (first..nx as i32).rfind(is_gone)?;
-        Some([first, last].map(|x| before.centre_of(start.with_x(x).to_array().map(|n| n as usize))))
+        let first = (0..nx).find(is_gone)?;
+        let last = (first..nx).rfind(is_gone)?;
+        Some([first, last].map(|x| bone.centre_of(start.with_x(x)).as_dvec3()))
     };
-    let rows = before.data.par_chunks(nx.max(1)).enumerate().filter_map(in_row);
+    let rows = (0..ny * nz).into_par_iter().filter_map(in_row);
     let ends = rows.map(|[a, b]| (a.min(b), a.max(b)));
     ends.reduce_with(|(low, high), (a, b)| (low.min(a), high.max(b)))
 }
@@ -210,7 +210,7 @@ impl Part {
 }
 
 /// Returns the share of a voxel's bone that is gone; `None` where the carved grid had none.
-fn share(ct: &VoxelVolume<i16>, voxel: USizeVec3, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<f32> {
+fn share(ct: &VoxelVolume<i16>, voxel: USizeVec3, bone: &BoneVolume) -> Option<f32> {
     if ct.data[ct.index(voxel.to_array())] < DENSE_HU {
         return None;
     }
@@ -226,8 +226,7 @@ fn share(ct: &VoxelVolume<i16>, voxel: USizeVec3, before: &VoxelVolume<i16>, bon
         let place = ct.world_from_voxel.transform_point3(voxel.as_dvec3() + (point + 0.5) / parts - 0.5);
         let place = place.as_vec3();
         let at = bone.voxel_of(place);
-        let was = before.get(at.as_usizevec3().to_array());
-        match was.and_then(|was| is_gone(was, bone.ct(at), near && is_cut(bone, place), bone.isovalue())) {
+        match is_gone(bone.scanned(at), bone.ct(at), near && is_cut(bone, place), bone.isovalue()) {
             Some(true) => gone += 1,
             Some(false) => left += 1,
             None => {}
@@ -292,7 +291,7 @@ mod tests {
         for spacing_mm in [0.5, 1.0] {
             let before = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Cubic, AIR_HU);
             let bone = BoneVolume::new(&before, 400).unwrap();
-            let nothing = drilled(ct.clone(), &before, &bone);
+            let nothing = drilled(ct.clone(), &bone);
             assert!(nothing.densities == ct && nothing.label() == RemovedLabel::default());
             let [nx, ny, nz] = before.dims;
             for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
@@ -302,7 +301,7 @@ mod tests {
                     bone.set_hu(voxel, AIR_HU);
                 }
             }
-            let after = drilled(ct.clone(), &before, &bone).densities;
+            let after = drilled(ct.clone(), &bone).densities;
             assert_eq!((after.dims, after.world_from_voxel), (ct.dims, ct.world_from_voxel));
             let (mut bone_within, mut rim) = (0, 0);
             for (at, (was, is)) in ct.data.iter().zip(&after.data).enumerate() {
@@ -329,7 +328,7 @@ mod tests {
         let bone = BoneVolume::new(&before, 400).unwrap();
         (0..64).for_each(|n| (0..5).for_each(|z| bone.set_hu(IVec3::new(n % 8, n / 8, z), AIR_HU)));
         let ct = VoxelVolume::isotropic([2; 3], Vec3::splat(-2.0), 4.0, 1000i16);
-        let after = drilled(ct, &before, &bone);
+        let after = drilled(ct, &bone);
         assert_eq!((after.densities.get([0, 0, 0]), after.densities.get([1, 1, 1])), (Some(AIR_HU), Some(500)));
         assert_eq!((after.removed.get([0, 0, 0]), after.removed.get([1, 1, 1])), (Some(1), Some(0)));
         assert_eq!(after.label(), RemovedLabel { voxels: 4, label_mm3: 256.0 });
@@ -356,7 +355,7 @@ mod tests {
     #[test]
     fn a_bore_thinner_than_two_voxels_takes_its_share_of_each() {
         let (before, bone, axis) = bored();
-        let after = drilled(before.clone(), &before, &bone).densities;
+        let after = drilled(before.clone(), &bone).densities;
         let gone = |at: usize| f64::from(1000 - after.data[at]) / 2000.0;
         // Of one layer across the bore.
         let layer = (0..400).map(|n| gone(10 + 20 * n)).sum::<f64>();
@@ -370,9 +369,9 @@ mod tests {
     #[test]
     fn a_bore_on_the_nodes_is_round_closed_and_as_wide_as_the_burr() {
         let (before, bone, axis) = bored();
-        let around = on_nodes_around(&before, &bone).unwrap();
+        let around = on_nodes_around(&bone).unwrap();
         assert!(around.dims[0] == 39 && around.dims[1] < 16 && around.spacing_mm().x == 0.5, "{:?}", around.dims);
-        assert!(on_nodes_around(&before, &BoneVolume::new(&before, 400).unwrap()).is_none());
+        assert!(on_nodes_around(&BoneVolume::new(&before, 400).unwrap()).is_none());
         let mesh = isosurface(&on_nodes(&bone), 400);
         let wall = |p: &Vec3| (*p - axis).with_x(0.0).length();
         let off: Vec<f32> = mesh

@@ -21,7 +21,6 @@ use serde::Serialize;
 use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_patient::Plan;
-use trepan_volume::VoxelVolume;
 
 /// Overlap and surface distance of the removed and the planned bone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -39,14 +38,11 @@ pub struct PlanComparison {
 }
 
 impl PlanComparison {
-    /// Compares the bone `before` and now with the plan; `None` if the plan contains no bone.
-    pub fn of(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<Self> {
-        let isovalue = bone.isovalue();
-        let planned = plan.of(before, isovalue);
-        let [nx, ny, _] = before.dims;
-        let voxel = |at: usize| IVec3::from([at % nx, at / nx % ny, at / (nx * ny)].map(|n| n as i32));
-        let was_bone = before.data.iter().enumerate().filter(|(_, hu)| **hu >= isovalue).map(|(at, _)| at);
-        let taken: Vec<usize> = was_bone.filter(|at| !bone.is_bone(voxel(*at))).collect();
+    /// Compares the bone as scanned and now with the plan; `None` if the plan contains no bone.
+    pub fn of(plan: &Plan, bone: &BoneVolume) -> Option<Self> {
+        let planned = plan.of(bone);
+        let gone = bone.scanned_bone().filter(|(_, voxel)| !bone.is_bone(*voxel));
+        let taken: Vec<usize> = gone.map(|(at, _)| at).collect();
         let both = planned.iter().filter(|at| taken.binary_search(at).is_ok()).count() as f64;
         let (of_plan, gone) = (planned.len() as f64, taken.len() as f64);
         let mm3 = f64::from(bone.voxel_mm3());
@@ -55,15 +51,15 @@ impl PlanComparison {
             taken_mm3: gone * mm3,
             outside_plan_mm3: (gone - both) * mm3,
             dice: 2.0 * both / (of_plan + gone),
-            surface_95_mm: surface_95(&border(before, &planned), &border(before, &taken)),
+            surface_95_mm: surface_95(&border(bone, &planned), &border(bone, &taken)),
         })
     }
 }
 
 /// Returns the centres of the voxels of a set that have a neighbour outside it, world mm. The set
 /// is in the voxels' order.
-fn border(of: &VoxelVolume<i16>, set: &[usize]) -> Vec<Vec3> {
-    let [nx, ny, nz] = of.dims;
+fn border(of: &BoneVolume, set: &[usize]) -> Vec<Vec3> {
+    let [nx, ny, nz] = of.dims();
     let inner = |[x, y, z]: [usize; 3]| x > 0 && y > 0 && z > 0 && x + 1 < nx && y + 1 < ny && z + 1 < nz;
     let strides = [1, nx, nx * ny];
     let on_border = |at: usize, place: [usize; 3]| {
@@ -75,7 +71,7 @@ fn border(of: &VoxelVolume<i16>, set: &[usize]) -> Vec<Vec3> {
     };
     let place = |at: usize| [at % nx, at / nx % ny, at / (nx * ny)];
     let at = set.iter().copied().filter(|&at| on_border(at, place(at)));
-    at.map(|at| of.centre_of(place(at)).as_vec3()).collect()
+    at.map(|at| of.centre_of(IVec3::from(place(at).map(|n| n as i32)))).collect()
 }
 
 /// Returns the 95 % Hausdorff distance of two sets of points, mm.
@@ -92,7 +88,7 @@ fn surface_95(a: &[Vec3], b: &[Vec3]) -> Option<f64> {
 mod tests {
     use super::*;
     use trepan_haptics::script::Site;
-    use trepan_volume::AIR_HU;
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     #[test]
     fn a_hole_beside_the_plan_has_the_dice_and_the_distance_of_two_shifted_cylinders() {
@@ -103,15 +99,15 @@ mod tests {
         let before = bone.snapshot();
         let site = Site { entry: Vec3::new(14.75, 14.75, 3.75), inward: Vec3::NEG_Z, bone_mm: 3.0, brain_mm: 5.0 };
         let plan = Plan::new(Some(&bone), site, 6.0, 0.0).unwrap();
-        assert_eq!(PlanComparison::of(&plan, &before, &bone).unwrap().dice, 0.0);
-        assert_eq!(PlanComparison::of(&plan, &before, &bone).unwrap().surface_95_mm, None);
+        assert_eq!(PlanComparison::of(&plan, &bone).unwrap().dice, 0.0);
+        assert_eq!(PlanComparison::of(&plan, &bone).unwrap().surface_95_mm, None);
         let drill = |shift: i32| {
             for at in 0..n * n * 10 {
                 let voxel = IVec3::new((at % n) as i32, (at / n % n) as i32, (at / (n * n)) as i32);
                 let planned = plan.takes(bone.centre_of(voxel - IVec3::X * shift));
                 bone.set_hu(voxel, if planned { AIR_HU } else { before.data[at] });
             }
-            PlanComparison::of(&plan, &before, &bone).unwrap()
+            PlanComparison::of(&plan, &bone).unwrap()
         };
         let same = drill(0);
         assert_eq!((same.dice, same.surface_95_mm, same.outside_plan_mm3), (1.0, Some(0.0), 0.0));

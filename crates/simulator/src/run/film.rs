@@ -31,7 +31,6 @@ use trepan_geometry::Vec3;
 use trepan_link::cell::Reader;
 use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
 use trepan_stages::notice::Notice;
-use trepan_volume::VoxelVolume;
 
 /// Session time between two shots, ms.
 pub(crate) const SHOT_MS: f64 = 1000.0 / 30.0;
@@ -109,7 +108,7 @@ pub(crate) struct Filming {
 impl Filming {
     /// Makes a film of a session that carves a skull, with a brain whose nodes are at `rest`. A
     /// length of `None` is not known yet.
-    pub fn new(skull: Option<Skull>, rest: Vec<Vec3>, length_ms: Option<f64>) -> Self {
+    pub fn new(skull: Option<Arc<BoneVolume>>, rest: Vec<Vec3>, length_ms: Option<f64>) -> Self {
         let brain_every_ms = length_ms.map_or(BRAIN_MS, |length_ms| (length_ms / BRAINS).max(SHOT_MS));
         let (skull, last_notices) = (skull.map(Carved::of), (0, None));
         Self { skull, rest, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }
@@ -162,13 +161,11 @@ impl Filming {
 }
 
 /// A skull, and the CT of all its voxels at the start of a film.
-pub(crate) type Skull = (Arc<BoneVolume>, Arc<VoxelVolume<i16>>);
 
 /// A skull that is carved, and its state at the last shot.
 struct Carved {
     bone: Arc<BoneVolume>,
     versions: Vec<u32>,
-    start: Arc<VoxelVolume<i16>>,
     /// The CT at the last shot in the bricks of voxels that changed, z slowest.
     last: HashMap<[usize; 3], Vec<i16>>,
     /// The cut at the last shot in the bricks of voxels where there was some.
@@ -176,13 +173,13 @@ struct Carved {
 }
 
 impl Carved {
-    fn of((bone, start): Skull) -> Self {
-        Self { versions: bone.seen(), start, last: HashMap::new(), last_cut: HashMap::new(), bone }
+    fn of(bone: Arc<BoneVolume>) -> Self {
+        Self { versions: bone.seen(), last: HashMap::new(), last_cut: HashMap::new(), bone }
     }
 
     /// Voxels of the CT and nodes of the cut that changed since the last call.
     fn changes(&mut self) -> (Vec<SceneChange>, Vec<SceneChange>) {
-        let Self { bone, versions, start, last, last_cut } = self;
+        let Self { bone, versions, last, last_cut } = self;
         let [nx, ny, nz] = bone.dims();
         let edge = BRICK as i32 * bone.cut_nodes();
         let mut now = vec![0; edge.pow(3) as usize];
@@ -190,7 +187,8 @@ impl Carved {
         bone.changed(versions, usize::MAX, |brick| {
             let [x, y, z] = brick.map(|b| b * BRICK);
             let voxels = || places([z, y, x], [nz, ny, nx]);
-            let at_start = || voxels().map(|(k, j, i)| start.data[i + nx * (j + ny * k)]).collect();
+            let at_start =
+                || voxels().map(|(k, j, i)| bone.scanned(IVec3::from([i, j, k].map(|n| n as i32)))).collect();
             let last = last.entry(brick).or_insert_with(at_start);
             for ((k, j, i), was) in voxels().zip(last) {
                 let at = IVec3::new(i as i32, j as i32, k as i32);
@@ -232,7 +230,7 @@ pub(crate) mod tests {
     use trepan_geometry::{Pose, ToolState};
     use trepan_stages::haptic_tick::ToolSample;
     use trepan_stages::program::Program;
-    use trepan_volume::AIR_HU;
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     /// Returns the view of a tool at the origin.
     pub(crate) fn view(time_ms: f64) -> View {
@@ -256,8 +254,7 @@ pub(crate) mod tests {
         let volume = VoxelVolume::isotropic([19, 17, 11], Vec3::ZERO, 1.0, 900i16);
         let made = |volume: &VoxelVolume<i16>| Arc::new(BoneVolume::new(volume, 400).unwrap());
         let (carved, shown) = (made(&volume), made(&volume));
-        let mut filming =
-            Filming::new(Some((carved.clone(), Arc::new(volume.clone()))), vec![Vec3::ZERO], Some(1000.0));
+        let mut filming = Filming::new(Some(carved.clone()), vec![Vec3::ZERO], Some(1000.0));
         let mut shots = Vec::new();
         let mut random = fastrand::Rng::with_seed(7);
         let mut states = Vec::new();

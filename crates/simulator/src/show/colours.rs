@@ -20,7 +20,7 @@ use trepan_geometry::{Aabb, Tool, Vec3};
 use trepan_link::wire::TickRecord;
 use trepan_patient::Plan;
 use trepan_render::Paint;
-use trepan_volume::{DistanceField, VoxelVolume};
+use trepan_volume::DistanceField;
 
 const SKY: [f32; 3] = [86.0, 180.0, 233.0];
 const GREEN: [f32; 3] = [0.0, 158.0, 115.0];
@@ -78,15 +78,11 @@ pub(crate) fn forbidden(field: &DistanceField, around: Aabb) -> Paint {
 }
 
 /// Paints removed and planned bone, voxel by voxel around the plan.
-pub(crate) fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Paint {
+pub(crate) fn against(plan: &Plan, bone: &BoneVolume) -> Paint {
     let reach = plan.hole_mm.max(plan.flap_mm) + 2.0 * AROUND_MM;
     let around = Aabb::of_points(&[plan.site.entry, plan.site.entry + DEEP_MM * plan.site.inward]).inflated(reach);
     let low = bone.centre_of(bone.voxel_of(around.min));
-    let was_bone = |voxel: IVec3| {
-        let inside = voxel.cmpge(IVec3::ZERO).all();
-        let was = inside.then(|| before.get(voxel.as_usizevec3().to_array())).flatten();
-        was.is_some_and(|hu| hu >= bone.isovalue())
-    };
+    let was_bone = |voxel: IVec3| bone.scanned(voxel) >= bone.isovalue();
     paint(2, Aabb { min: low, max: around.max }, bone.spacing_mm(), |place| {
         let voxel = bone.voxel_of(place);
         if !was_bone(voxel) {
@@ -179,7 +175,7 @@ mod tests {
     use super::*;
     use trepan_geometry::{Pose, Wrench};
     use trepan_haptics::script::Site;
-    use trepan_volume::AIR_HU;
+    use trepan_volume::{AIR_HU, VoxelVolume};
 
     fn at(paint: &Paint, place: Vec3) -> [u8; 4] {
         let texel = ((place - paint.origin) / paint.spacing_mm).round().as_uvec3();
@@ -191,7 +187,6 @@ mod tests {
         let mut ct = VoxelVolume::isotropic([50, 50, 14], Vec3::ZERO, 1.0, AIR_HU);
         ct.data[50 * 50 * 4..50 * 50 * 10].fill(1000);
         let bone = BoneVolume::new(&ct, 400).unwrap();
-        let before = bone.snapshot();
         let site = Site { entry: Vec3::new(25.0, 25.0, 9.5), inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
         let plan = Plan::new(Some(&bone), site, 5.0, 0.0).unwrap();
         let paint = planned(&plan, None);
@@ -200,7 +195,7 @@ mod tests {
         for (x, y) in [(25, 25), (33, 25)] {
             bone.set_hu(IVec3::new(x, y, 8), AIR_HU);
         }
-        let map = against(&plan, &before, &bone);
+        let map = against(&plan, &bone);
         let colour = |x: f32| at(&map, Vec3::new(x, 25.0, 8.0));
         assert_eq!(colour(25.0), coloured(GREEN, 0.9));
         assert_eq!(colour(33.0), coloured(VERMILION, 1.0));

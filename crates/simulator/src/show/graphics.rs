@@ -10,7 +10,6 @@ use trepan_budget::Picture;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_link::Recording;
 use trepan_render::{Camera, Frame, Painter, RenderError, SceneData, SliceLook};
-use trepan_volume::VoxelVolume;
 
 /// Caption of the map of bone.
 const OF_BONE: &str = "bone against the plan: green as planned, blue planned and left, red taken outside the plan";
@@ -80,14 +79,8 @@ impl SessionSetup {
 
     /// Draws the maps at the end of a session: bone against the plan, force on the brain. A failed
     /// map gives its fault.
-    pub fn maps(
-        &self,
-        painter: &mut Painter,
-        before: Option<&VoxelVolume<i16>>,
-        recording: &Recording,
-        folder: &Path,
-    ) -> Vec<Result<Shot, SessionError>> {
-        let removed = self.bone().zip(before).map(|(bone, before)| colours::against(&self.plan, before, bone));
+    pub fn maps(&self, painter: &mut Painter, recording: &Recording, folder: &Path) -> Vec<Result<Shot, SessionError>> {
+        let removed = self.bone().map(|bone| colours::against(&self.plan, bone));
         let field = self.scene.brain.as_ref().map(|brain| &*brain.field);
         let forces = field.and_then(|field| colours::forces(field, self.program.tray(), &recording.ticks));
         let outward = -self.plan.site.inward;

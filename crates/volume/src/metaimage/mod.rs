@@ -148,7 +148,7 @@ fn voxels(source: &mut Source, keys: &Keys, count: u64, part: Part) -> Result<Ve
     let (total, scale) = (count.saturating_mul(part.of), scale(source, keys)?);
     if keys.text(&["BinaryData"]).is_some_and(|v| v.eq_ignore_ascii_case("false")) {
         let mut values = source.written_samples(total)?;
-        part.keep(&mut values, 0, 0);
+        part.keep(&mut values, 0);
         values.iter_mut().for_each(|v| *v = (scale.slope * f64::from(*v) + scale.intercept) as f32);
         return Ok(values);
     }

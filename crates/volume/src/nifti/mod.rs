@@ -27,7 +27,7 @@ pub(crate) use write::is_sheared;
 pub use write::write;
 
 use crate::source::{Part, Source};
-use crate::{Format, Import, ReadError, VoxelVolume};
+use crate::{Format, Import, ReadError, Sample, VoxelVolume};
 use header::Header;
 use std::path::{Path, PathBuf};
 
@@ -54,12 +54,18 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
     read_one(path, None)
 }
 
-fn read_one(path: &Path, index: Option<usize>) -> Result<Import, ReadError> {
+/// Reads the one volume of a file as numbers of another type, rounded, in no more memory than
+/// they need.
+pub fn read_as<T: Sample>(path: &Path) -> Result<VoxelVolume<T>, ReadError> {
+    read_one(path, None).map(|import| import.volume)
+}
+
+fn read_one<T: Sample>(path: &Path, index: Option<usize>) -> Result<Import<T>, ReadError> {
     import_source(Source::open(&header_of_pair(path))?, index)
 }
 
 /// Reads from a source that starts with the header.
-fn import_source(mut source: Source, index: Option<usize>) -> Result<Import, ReadError> {
+fn import_source<T: Sample>(mut source: Source, index: Option<usize>) -> Result<Import<T>, ReadError> {
     let header = Header::read(&mut source)?;
     match header.voxels_elsewhere {
         false => voxels(source, &header, index),
@@ -67,7 +73,7 @@ fn import_source(mut source: Source, index: Option<usize>) -> Result<Import, Rea
     }
 }
 
-fn voxels(mut source: Source, header: &Header, index: Option<usize>) -> Result<Import, ReadError> {
+fn voxels<T: Sample>(mut source: Source, header: &Header, index: Option<usize>) -> Result<Import<T>, ReadError> {
     let count = source.voxels("dim", header.dims)?;
     let (part, note) = Part::numbered(source.file(), "dim", (count, header.volumes), index)?;
     let ahead = header.vox_offset.checked_sub(source.taken()).ok_or_else(|| {

@@ -265,7 +265,7 @@ fn voxels(source: &mut Source, keys: &Keys, count: u64, part: Part) -> Result<(V
         "raw" => from,
         "txt" | "text" | "ascii" => {
             let mut values = from.written_samples(total)?;
-            part.keep(&mut values, 0, 0);
+            part.keep(&mut values, 0);
             return Ok((values, "text".into()));
         }
         "gz" | "gzip" => {

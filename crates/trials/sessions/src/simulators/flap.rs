@@ -24,7 +24,7 @@ pub fn findings(table: &CaseFixture) -> Findings {
 /// Cuts along the outline, or from its first point along its other way.
 fn lap(table: &CaseFixture, name: &str, turn_back: bool, findings: &mut Findings) {
     let (bone, brain) = table.fresh();
-    let (before, pieces) = (bone.snapshot(), Piece::all(&bone));
+    let pieces = Piece::all(&bone);
     let mut how = Plan { outline: table.flap.outline.clone(), ..Plan::default() };
     if turn_back {
         how.outline[1..].reverse();
@@ -48,7 +48,7 @@ fn lap(table: &CaseFixture, name: &str, turn_back: bool, findings: &mut Findings
     }
     let of_pieces = cut_off.first().map_or(0.0, |piece| piece.voxels as f64 * f64::from(bone.voxel_mm3()));
     let lifted = bench.notices.iter().any(|notice| matches!(notice.what, What::FlapLifted(_)));
-    let against = PlanComparison::of(&table.flap, &before, &bone).expect("a flap is planned");
+    let against = PlanComparison::of(&table.flap, &bone).expect("a flap is planned");
     findings.rows.push(
         Row::new(format!("{name} of 24 mm on the built-in case"), "craniotome")
             .metric("free_after_s", 1e-3 * free as f64)

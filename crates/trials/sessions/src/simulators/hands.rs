@@ -95,7 +95,6 @@ struct Operated {
 impl Operated {
     fn by(table: &CaseFixture, plan: &Plan, tremor_mm: f32) -> Self {
         let (bone, brain) = table.fresh();
-        let before = bone.snapshot();
         let script = Script::planned("craniotomy", &table.plan.site, END_MS, plan).expect("the site is sound");
         let hand = Box::new(Novice { script, tremor_mm });
         let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, None, HandModel::FIRM, hand);
@@ -104,7 +103,7 @@ impl Operated {
         let raised = |what: &What| matches!(what, What::Warning(_, true, _));
         Self {
             scores: *bench.stage.scores(),
-            against: PlanComparison::of(&table.plan, &before, &bone).expect("a hole is planned"),
+            against: PlanComparison::of(&table.plan, &bone).expect("a hole is planned"),
             warnings: bench.notices.iter().filter(|notice| raised(&notice.what)).count(),
             late_ticks,
             odd_warnings,
