@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates by floor, lowest first.
-const FLOORS: [&[&str]; 10] = [
+const FLOORS: [&[&str]; 11] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget", "window", "evidence", "stages"],
     &["patient"],
+    &["models"],
     &["simulator"],
     &["craniotomy", "brain", "integrated", "trials-scenes"],
     &["trials-bone", "trials-tissue"],
@@ -88,7 +89,7 @@ fn short(package: &str) -> &str {
 /// The crates of trials, and those that a session consists of, are kept to the same as one.
 fn group(name: &str) -> &str {
     match name {
-        "patient" => "simulator",
+        "patient" | "models" => "simulator",
         _ if name.starts_with("trials-") => "trials",
         _ => name,
     }

@@ -25,7 +25,7 @@ pub struct Progress(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
-    start: Instant,
+    watch: Stopwatch,
     stages: Mutex<Vec<Stage>>,
     cancelled: AtomicBool,
     running: AtomicBool,
@@ -35,14 +35,14 @@ struct Shared {
 impl Default for Progress {
     fn default() -> Self {
         let (cancelled, running, draft) = Default::default();
-        Self(Arc::new(Shared { start: Instant::now(), stages: Mutex::default(), cancelled, running, draft }))
+        Self(Arc::new(Shared { watch: Stopwatch::start(), stages: Mutex::default(), cancelled, running, draft }))
     }
 }
 
 impl Progress {
     /// Begins a stage, which ends the one before; an error if loading was cancelled.
     pub fn next(&self, what: &'static str) -> Result<(), PatientError> {
-        self.lock().push((what, ms_since(self.0.start)));
+        self.lock().push((what, self.0.watch.now_ms()));
         if self.0.cancelled.load(Ordering::Relaxed) { Err(PatientError::Cancelled) } else { Ok(()) }
     }
 
@@ -53,7 +53,7 @@ impl Progress {
 
     /// Ends the last stage: the session runs.
     pub fn run(&self) {
-        self.lock().push((RUNNING, ms_since(self.0.start)));
+        self.lock().push((RUNNING, self.0.watch.now_ms()));
         self.end_wait();
         self.0.running.store(true, Ordering::Relaxed);
     }
@@ -92,7 +92,7 @@ impl Progress {
 
     /// Returns the stages so far, and the time since loading began, ms.
     pub fn so_far(&self) -> (Vec<Stage>, f64) {
-        (self.lock().clone(), ms_since(self.0.start))
+        (self.lock().clone(), self.0.watch.now_ms())
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Stage>> {
@@ -100,9 +100,20 @@ impl Progress {
     }
 }
 
-/// Time since an instant, ms.
-pub(crate) fn ms_since(start: Instant) -> f64 {
-    1e3 * start.elapsed().as_secs_f64()
+/// Measures time from a start.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch(Instant);
+
+impl Stopwatch {
+    /// Starts now.
+    pub fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Time since the start, ms.
+    pub fn now_ms(&self) -> f64 {
+        1e3 * self.0.elapsed().as_secs_f64()
+    }
 }
 
 /// Name of the last stage, in which the session runs.

@@ -1,16 +1,16 @@
 //! Progress of an import: shows the running stage, and the share of each stage at the end.
 
 use crate::PatientError;
-use crate::progress::{DraftSkull, Progress, ms_since};
+use crate::progress::{DraftSkull, Progress, Stopwatch};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Progress bar that records the duration of each stage.
 pub struct ImportStages {
     bar: ProgressBar,
     progress: Progress,
-    start: Instant,
+    watch: Stopwatch,
     /// Name and start time of each stage, ms.
     began: Vec<(&'static str, f64)>,
 }
@@ -21,12 +21,12 @@ impl ImportStages {
         let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} {elapsed}");
         let bar = ProgressBar::new(count).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(120));
-        Self { bar, progress: progress.clone(), start: Instant::now(), began: Vec::new() }
+        Self { bar, progress: progress.clone(), watch: Stopwatch::start(), began: Vec::new() }
     }
 
     /// Begins a stage, which ends the one before; an error if loading was cancelled.
     pub fn next(&mut self, what: &'static str) -> Result<(), PatientError> {
-        self.began.push((what, ms_since(self.start)));
+        self.began.push((what, self.watch.now_ms()));
         self.bar.inc(1);
         self.bar.set_message(what);
         self.progress.next(what)
@@ -44,7 +44,7 @@ impl ImportStages {
 
     /// Ends the last stage and tells how long all took; the share of each is logged for debugging.
     pub fn finish(self) -> String {
-        let end_ms = ms_since(self.start);
+        let end_ms = self.watch.now_ms();
         self.bar.finish_and_clear();
         tracing::debug!("import: {}", shares(&self.began, end_ms));
         format!("{:.1} s", 1e-3 * end_ms)

@@ -1,11 +1,11 @@
 //! Opens the case that the options name, and builds case folders.
 
 use crate::error::SessionError;
-use crate::measure::in_case;
 use crate::models::{self, ModelRequest, Models};
 use crate::options::{Options, Patient};
 use std::path::Path;
 use trepan_budget::Setup;
+use trepan_models::measure::in_case;
 use trepan_patient::Cache;
 use trepan_patient::Recipe;
 use trepan_patient::TissueClass;
@@ -215,4 +215,63 @@ pub(crate) fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
         return built_in;
     }
     Inputs { name: None, ct, mri, labels, tissues }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use std::collections::BTreeMap;
+    use trepan_models::measure::CaseErrors;
+    use trepan_models::measure::in_case::{SHIPPED, before_building, shipped};
+    use trepan_patient::TissueSource;
+
+    /// With `TREPAN_KEEP_MEASURED` the errors are measured, and kept in the file that is shipped.
+    #[test]
+    fn the_built_in_case_comes_with_its_measurements() {
+        let (home, head) = (tempfile::tempdir().unwrap(), trepan_fixtures::case_head());
+        let tissues = TissueSource::regions_of_aseg(head.aseg);
+        let inputs = Inputs {
+            name: Some(head.name),
+            ct: Some(head.ct),
+            mri: Some(head.mri),
+            labels: Some(head.labels),
+            tissues,
+        };
+        let patient = Options::try_parse_from(["x"]).unwrap().patient;
+        let (cache, recipe) = (Cache::at(home.path().into()), recipe(&patient));
+        let keeps = std::env::var_os("TREPAN_KEEP_MEASURED").is_some();
+        let mut all = BTreeMap::new();
+        for program in [Program::Integrated, Program::Craniotomy, Program::Brain] {
+            let progress = Progress::default();
+            let mut import = Import::begin(program, (&inputs, &recipe), &cache, &progress).unwrap();
+            import.store();
+            let request = ModelRequest::to_plan(program, &patient, Default::default(), 1000.0, [960, 600]).unwrap();
+            for card in [false, true] {
+                let facts = import.facts;
+                let settled = request.settle(
+                    &facts,
+                    || card,
+                    |scene, rows, element| {
+                        let key = cache.under(&import.key, &CaseErrors::about(scene, rows, element));
+                        let errors = if keeps {
+                            before_building(&mut import, scene, rows, element)?
+                        } else {
+                            shipped(&key).unwrap_or_default()
+                        };
+                        all.insert(key, errors.clone());
+                        Ok(errors)
+                    },
+                );
+                let measured = settled.unwrap().measured;
+                assert_eq!((measured.bone, measured.tissue), (program.has_bone(), program.has_tissue()), "{program:?}");
+            }
+        }
+        if keeps {
+            let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/measured/built-in.json");
+            std::fs::write(file, serde_json::to_string_pretty(&all).unwrap() + "\n").unwrap();
+        }
+        let shipped: BTreeMap<String, CaseErrors> = serde_json::from_str(SHIPPED).unwrap();
+        assert!(keeps || shipped == all, "run this test with TREPAN_KEEP_MEASURED=1 and build again");
+    }
 }

@@ -7,7 +7,6 @@ use crate::compare::compare;
 use crate::constants;
 use crate::desk::{self, Done};
 use crate::device_test;
-use crate::ingredients::table;
 use crate::inspect::inspect;
 use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, SessionsTask, Task, rate};
@@ -23,6 +22,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
+use trepan_models::ingredients::table;
 use trepan_volume::dicom::Series;
 use trepan_window::display;
 

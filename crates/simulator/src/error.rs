@@ -1,6 +1,7 @@
 //! Errors before and after a session, and their exit codes.
 
 use std::path::{Path, PathBuf};
+use trepan_models::ModelError;
 use trepan_patient::PatientError;
 
 /// Error that keeps a session from starting or from writing its files. Errors that the user can
@@ -13,6 +14,9 @@ pub enum SessionError {
     /// A case that cannot be opened, or loading that the user cancelled.
     #[error(transparent)]
     Patient(#[from] PatientError),
+    /// Models that cannot be measured or made.
+    #[error(transparent)]
+    Model(ModelError),
     /// Unreadable image.
     #[error(transparent)]
     Read(#[from] trepan_volume::ReadError),
@@ -51,7 +55,17 @@ impl SessionError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Picture(_) | Self::Internal(_) | Self::Patient(PatientError::Internal(_)) => 1,
+            Self::Model(fault) if fault.is_internal() => 1,
             _ => 2,
+        }
+    }
+}
+
+impl From<ModelError> for SessionError {
+    fn from(fault: ModelError) -> Self {
+        match fault {
+            ModelError::Patient(fault) => Self::Patient(fault),
+            fault => Self::Model(fault),
         }
     }
 }

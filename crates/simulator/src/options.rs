@@ -2,12 +2,12 @@
 
 use crate::constants;
 use crate::error::SessionError;
-use crate::ingredients::{KeyValue, setting};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::convert::Infallible;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use trepan_budget::Quality;
+use trepan_models::ingredients::{KeyValue, setting};
 use trepan_patient::{TissueClass, TissueSource};
 use trepan_stages::force_scale::ForceScale;
 use trepan_stages::program::Program;

@@ -2,12 +2,10 @@
 
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
-use crate::ingredients::{Ingredients, Support};
 use crate::models::Models;
 use crate::operation::Operation;
 use crate::report::regions::{Region, regions};
 use crate::run::{self, Stages};
-use crate::solver::{self, SolverInfo};
 use std::sync::{Arc, OnceLock};
 use trepan_bone::{BoneVolume, Piece};
 use trepan_budget::Bone;
@@ -15,6 +13,8 @@ use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
 use trepan_measurements::support;
 use trepan_mesh::TetMesh;
+use trepan_models::ingredients::{Ingredients, Support};
+use trepan_models::solver::{self, SolverInfo};
 use trepan_patient::Case;
 use trepan_patient::Plan;
 use trepan_patient::anchors::BrainSupport;

@@ -10,8 +10,6 @@ mod old_header;
 
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
-use crate::ingredients::Ingredients;
-use crate::measure::Parts;
 use crate::operation::Operation;
 use crate::options::{CSF_SPEED_UPS, MODULI_KPA, RATES_HZ};
 use serde::{Deserialize, Serialize};
@@ -19,6 +17,8 @@ use serde_json::{Number, Value};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
+use trepan_models::ingredients::Ingredients;
+use trepan_models::measure::Parts;
 use trepan_stages::force_scale::ForceScale;
 
 /// Everything that a session's forces depend on, with the reasons for its models.

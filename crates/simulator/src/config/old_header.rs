@@ -1,8 +1,8 @@
 //! Names of entries in recordings made before 2026-11-29. Goes on 2027-06-01.
 
-use crate::ingredients::KEYS;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use trepan_models::ingredients::KEYS;
 
 /// Entries of the operation and of the models' sizes.
 const OPERATION: [&str; 9] = [
@@ -59,8 +59,8 @@ fn value(name: &str, text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use crate::config::SessionConfig;
-    use crate::ingredients::Element;
     use trepan_link::wire::SessionHeader;
+    use trepan_models::ingredients::Element;
     use trepan_patient::TissueClass;
 
     #[test]

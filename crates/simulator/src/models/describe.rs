@@ -2,12 +2,12 @@
 
 use super::Models;
 use crate::config::{SessionConfig, Sizes};
-use crate::ingredients::{Ingredients, KEYS};
-use crate::measure::Parts;
 use crate::uncertainty;
 use serde::Serialize;
 use std::fmt::Display;
 use trepan_budget::{Plan, Setup};
+use trepan_models::ingredients::{Ingredients, KEYS};
+use trepan_models::measure::Parts;
 
 /// The models in `summary.json`.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -23,14 +23,15 @@ pub use describe::{ModelSummary, TissueSummary};
 
 use crate::config::SessionConfig;
 use crate::error::SessionError;
-use crate::ingredients::{Element, Ingredients};
-use crate::measure::{self, CaseErrors, Parts, PlannedParts};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::uncertainty;
 use overrides::{Overrides, written};
 use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
+use trepan_models::ModelError;
+use trepan_models::ingredients::{Element, Ingredients};
+use trepan_models::measure::{self, CaseErrors, Parts, PlannedParts};
 use trepan_patient::Recipe;
 use trepan_patient::TissueClass;
 use trepan_patient::import::Facts;
@@ -138,7 +139,7 @@ impl ModelRequest {
         &self,
         facts: &Facts,
         card: impl FnOnce() -> bool,
-        case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, SessionError>,
+        case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, ModelError>,
     ) -> Result<Models, SessionError> {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
@@ -178,7 +179,7 @@ impl ModelRequest {
         facts: &Facts,
         wanted: PlannedParts,
         device_draws: bool,
-        case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, SessionError>,
+        case_errors: impl FnOnce(&Scene, &Rows, Element) -> Result<CaseErrors, ModelError>,
     ) -> Result<(Plan, Parts<bool>), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
         let solver_threads = self.given.ingredients.threads.map(|threads| threads as u32);
@@ -355,7 +356,7 @@ mod tests {
     use clap::Parser;
     use trepan_budget::{Bone, Tissue};
 
-    fn unmeasured(_: &Scene, _: &Rows, _: Element) -> Result<CaseErrors, SessionError> {
+    fn unmeasured(_: &Scene, _: &Rows, _: Element) -> Result<CaseErrors, ModelError> {
         Ok(CaseErrors::default())
     }
 

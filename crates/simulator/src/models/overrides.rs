@@ -2,10 +2,10 @@
 
 use crate::config::{SessionConfig, Sizes};
 use crate::error::SessionError;
-use crate::ingredients::{Ingredients, KEYS, KeyValue, Part};
-use crate::measure::Parts;
 use crate::options::Patient;
 use trepan_budget::{Bone, Picture, Tissue};
+use trepan_models::ingredients::{Ingredients, KEYS, KeyValue, Part};
+use trepan_models::measure::Parts;
 
 /// Given parameters of each part, and `words` that describe them.
 #[derive(Clone, Debug)]

@@ -3,7 +3,6 @@
 
 use crate::constants;
 use crate::error::SessionError;
-use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
 use crate::report::debrief::Debrief;
@@ -18,6 +17,7 @@ use serde_json::json;
 use trepan_budget::Tissue;
 use trepan_link::Recording;
 use trepan_link::wire::TickRecord;
+use trepan_models::ingredients::KEYS;
 use trepan_stages::force_scale::ForceScale;
 
 /// A picture for the report.

@@ -160,8 +160,6 @@ impl Filming {
     }
 }
 
-/// A skull, and the CT of all its voxels at the start of a film.
-
 /// A skull that is carved, and its state at the last shot.
 struct Carved {
     bone: Arc<BoneVolume>,

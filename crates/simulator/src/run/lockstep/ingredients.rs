@@ -3,8 +3,6 @@
 use super::*;
 use crate::config::SessionConfig;
 use crate::device_limits::DeviceLimits;
-use crate::ingredients::{KEYS, SolverDevice};
-use crate::measure::CaseErrors;
 use crate::models::ModelRequest;
 use crate::operation::Operation;
 use crate::options::Options;
@@ -12,6 +10,8 @@ use crate::session_setup::SessionSetup;
 use clap::Parser;
 use trepan_geometry::{Quat, ToolKind, Vec3};
 use trepan_haptics::{Capabilities, DeviceName};
+use trepan_models::ingredients::{KEYS, SolverDevice};
+use trepan_models::measure::CaseErrors;
 use trepan_patient::import::Facts;
 use trepan_patient::opening::Opening;
 use trepan_patient::{Brain, Case};

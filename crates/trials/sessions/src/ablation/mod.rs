@@ -2,7 +2,7 @@
 //!
 //! # Theory
 //! The default is what `--quality auto` runs, on the sizes of `usual`, which are the same on every
-//! machine. The table of keys (`trepan_simulator::variants`) gives the values; one that the default
+//! machine. The table of keys (`trepan_models::variants`) gives the values; one that the default
 //! has is left out instead. Each is run alone against the default, along its path of the hand and
 //! on its mesh, tick by tick:
 //!
@@ -42,8 +42,8 @@ use std::sync::Mutex;
 use trepan_budget::Quality;
 use trepan_evidence::part::{Part, Scope};
 use trepan_evidence::suite::{Findings, Gate, Row};
+use trepan_models::{Effect, Variant, of_quality, realistic, variants};
 use trepan_render::Image;
-use trepan_simulator::{Effect, Variant, of_quality, realistic, variants};
 
 /// What the rows are called.
 const SCENE: &str = "drill, open, press the brain";

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_simulator::measure::bone::Skull;
-use trepan_simulator::measure::tissue::Shape;
+use trepan_models::measure::bone::Skull;
+use trepan_models::measure::tissue::Shape;
 use trepan_soft::Material;
 use trepan_volume::{
     AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, largest_component, read,

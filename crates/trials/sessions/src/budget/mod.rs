@@ -25,7 +25,7 @@ use trepan_budget::{Bone, Scene};
 use trepan_evidence::part::{Part, Scope};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
-use trepan_simulator::measure::bone::Stretch;
+use trepan_models::measure::bone::Stretch;
 
 /// Random numbers of the scenes that are judged; those of training lie elsewhere.
 const SEED: u64 = 0x6275_6467_6574;

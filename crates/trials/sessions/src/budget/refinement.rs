@@ -16,9 +16,9 @@ use trepan_budget::Tissue;
 use trepan_evidence::part::Scope;
 use trepan_evidence::picture::{Chart, Mark};
 use trepan_evidence::suite::{Findings, Row};
+use trepan_models::Element;
+use trepan_models::measure::tissue::{Brains, Push};
 use trepan_patient::Fineness;
-use trepan_simulator::Element;
-use trepan_simulator::measure::tissue::{Brains, Push};
 
 /// Tetrahedra of the whole brain.
 const TETS: [usize; 4] = [3_000, 8_000, 20_000, 50_000];

@@ -4,9 +4,9 @@ use super::case::Case;
 use std::sync::Arc;
 use trepan_budget::{Machine, Scene};
 use trepan_geometry::Vec3;
-use trepan_simulator::measure::Sight;
-use trepan_simulator::measure::bone::Slide;
-use trepan_simulator::measure::picture::View;
+use trepan_models::measure::Sight;
+use trepan_models::measure::bone::Slide;
+use trepan_models::measure::picture::View;
 
 /// Places that the eye goes to.
 pub const EYES: usize = 3;

@@ -5,10 +5,10 @@ use super::case::{Case, Source};
 use super::scene::Situation;
 use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, FEATURES, Kind, Picture, PowerLaw, Quality, Row, Tissue, write};
+use trepan_models::Ingredients;
+use trepan_models::measure::tissue::{self, Brains, Push};
+use trepan_models::measure::{self, PlannedParts, bone, picture};
 use trepan_patient::Fineness;
-use trepan_simulator::Ingredients;
-use trepan_simulator::measure::tissue::{self, Brains, Push};
-use trepan_simulator::measure::{self, PlannedParts, bone, picture};
 
 /// Random numbers of training: far from those of the scenes that are judged.
 const SEED: u64 = 0x7472_6169_6e00;

@@ -8,12 +8,12 @@ use trepan_budget::{
     TissueForce, bone_error_n, holds_walls, plan_with, tissue_over,
 };
 use trepan_evidence::suite::{Findings, Row};
+use trepan_models::measure::CaseErrors;
+use trepan_models::measure::bone::Stretch;
+use trepan_models::measure::picture::View;
+use trepan_models::measure::tissue::{Brains, LEAST_MM, Measurement, Push};
+use trepan_models::{Element, Ingredients};
 use trepan_patient::Fineness;
-use trepan_simulator::measure::CaseErrors;
-use trepan_simulator::measure::bone::Stretch;
-use trepan_simulator::measure::picture::View;
-use trepan_simulator::measure::tissue::{Brains, LEAST_MM, Measurement, Push};
-use trepan_simulator::{Element, Ingredients};
 
 /// Tetrahedra that a quick run has at most.
 const QUICK_TETS: usize = 8_000;

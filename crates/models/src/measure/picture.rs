@@ -1,11 +1,11 @@
 //! Measures the error of pictures of the skull with fewer rays or pixels, against every ray of the
 //! full picture.
 
-use crate::run::clock::Clock;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_budget::{Picture, Scene};
 use trepan_geometry::Vec3;
+use trepan_patient::progress::Stopwatch;
 use trepan_render::{Camera, Casting, Frame, Image, ProcessorRenderer, RenderError, SceneData, SliceLook};
 
 /// Resolutions along an edge, as shares of the full picture's.
@@ -92,7 +92,7 @@ fn draw(
     let size = full.map(|n| ((f64::from(n) * choice.detail).round() as u32).max(1));
     renderer.resize(size)?;
     renderer.set_casting(Casting { sparse: choice.sparse, ..Casting::default() });
-    let clock = Clock::start();
+    let clock = Stopwatch::start();
     renderer.draw(frame)?;
     Ok((renderer.image().clone(), 1e3 * clock.now_ms()))
 }

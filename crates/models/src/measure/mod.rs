@@ -3,7 +3,7 @@
 
 pub mod bone;
 mod case_errors;
-pub(crate) mod in_case;
+pub mod in_case;
 mod machine;
 pub mod picture;
 pub mod tissue;

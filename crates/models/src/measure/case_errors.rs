@@ -26,7 +26,7 @@ use super::Parts;
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
 use super::tissue::{self, Brains, LEAST_MM, Push, Shape};
-use crate::error::SessionError;
+use crate::ModelError;
 use crate::ingredients::Element;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
@@ -238,7 +238,7 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec
         // Where the brain is fixed, the error of every mesh would be zero.
         if push.moved_mm() < LEAST_MM { Ok(Vec::new()) } else { push.measure(&brains) }
     };
-    let found = found().unwrap_or_else(|fault: SessionError| {
+    let found = found().unwrap_or_else(|fault: ModelError| {
         tracing::warn!("{fault}");
         Vec::new()
     });

@@ -7,7 +7,6 @@
 
 use crate::ingredients::Ingredients;
 use crate::measure::PlannedParts;
-use crate::run::clock::Clock;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
@@ -15,6 +14,7 @@ use trepan_budget::Machine;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile, units};
 use trepan_mesh::Surface;
 use trepan_patient::TissueClass;
+use trepan_patient::progress::Stopwatch;
 use trepan_render::{Camera, Frame, ProcessorRenderer, SceneData, SliceLook};
 use trepan_rigid::{Method, RigidStep};
 use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
@@ -31,7 +31,7 @@ const PIXELS: u32 = 160;
 /// Measures this machine. `device_draws`: whether a graphics card draws; tissue is stepped with
 /// these ingredients, on one thread.
 pub fn machine(wanted: PlannedParts, device_draws: bool, ingredients: &Ingredients) -> Machine {
-    let (clock, usual) = (Clock::start(), Machine::default());
+    let (clock, usual) = (Stopwatch::start(), Machine::default());
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
     Machine {
         ns_per_tet_step: if wanted.tissue { ns_per_tet_step(&clock, ingredients) } else { usual.ns_per_tet_step },
@@ -44,7 +44,7 @@ pub fn machine(wanted: PlannedParts, device_draws: bool, ingredients: &Ingredien
 }
 
 /// Median time of a call, µs.
-fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
+fn median_us(clock: &Stopwatch, calls: usize, mut call: impl FnMut(usize)) -> f64 {
     let time_us = |i| {
         let began_ms = clock.now_ms();
         call(i);
@@ -54,7 +54,7 @@ fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
 }
 
 /// Median time per tetrahedron of a TLED step, ns.
-fn ns_per_tet_step(clock: &Clock, ingredients: &Ingredients) -> f64 {
+fn ns_per_tet_step(clock: &Stopwatch, ingredients: &Ingredients) -> f64 {
     let mesh = boxes::split_box([10; 3], Vec3::splat(100.0));
     let tets = mesh.tets.len();
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
@@ -74,7 +74,7 @@ fn ns_per_tet_step(clock: &Clock, ingredients: &Ingredients) -> f64 {
 }
 
 /// Median tick of `god-object-sphere` with a burr of 3 mm on 0.5 mm voxels, µs.
-fn us_per_rigid_tick(clock: &Clock) -> f64 {
+fn us_per_rigid_tick(clock: &Stopwatch) -> f64 {
     let n = 64;
     let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-15.75), 0.5, 0i16);
     for at in 0..ct.data.len() {
@@ -93,7 +93,7 @@ fn us_per_rigid_tick(clock: &Clock) -> f64 {
 
 /// Time per ray on a wavy shell of bone, ns. Each picture has another view direction, so that
 /// nothing is reused.
-fn ns_per_ray(clock: &Clock) -> f64 {
+fn ns_per_ray(clock: &Stopwatch) -> f64 {
     let n = 96;
     let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-95.0), 2.0, AIR_HU);
     for at in 0..ct.data.len() {

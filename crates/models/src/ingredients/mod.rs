@@ -12,7 +12,7 @@ mod law;
 mod variants;
 
 pub use keys::Effect;
-pub(crate) use keys::{KEYS, KeyValue, Part, setting, table};
+pub use keys::{KEYS, KeyValue, Part, setting, table};
 pub use law::Law;
 pub use variants::{Variant, of_quality, realistic, variants};
 
@@ -69,7 +69,7 @@ pub struct Ingredients {
 }
 
 /// Usual [`Ingredients::dynamic_mass_scaling`].
-pub(crate) const DYNAMIC_MASS_SCALING: f32 = 16.0;
+pub const DYNAMIC_MASS_SCALING: f32 = 16.0;
 
 /// Tetrahedral elements of the solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -140,7 +140,7 @@ impl Default for Ingredients {
 
 impl Relaxation {
     /// Moduli at hand speed over those of a slow test, of which `--young-modulus-kpa` is one.
-    pub(crate) fn hand_speed_factor(self) -> f32 {
+    pub fn hand_speed_factor(self) -> f32 {
         if self == Self::SolidAndFluid { fits::HAND_SPEED_FACTOR.f32() } else { 1.0 }
     }
 }
@@ -148,12 +148,12 @@ impl Relaxation {
 impl Ingredients {
     /// Whether every element must be stepped: tissue that relaxes never rests, and the graphics
     /// card has no sleeping elements.
-    pub(crate) fn steps_all(&self) -> bool {
+    pub fn steps_all(&self) -> bool {
         self.relaxation != Relaxation::Off || self.device != SolverDevice::Cpu
     }
 
     /// Those of the force of bone.
-    pub(crate) fn bone_models(&self) -> BoneModels {
+    pub fn bone_models(&self) -> BoneModels {
         BoneModels { friction: self.bone_friction, shading: self.shading, vibration: self.vibration }
     }
 }

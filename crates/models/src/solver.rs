@@ -5,10 +5,9 @@
 //! What cannot run on the card runs on the processor, with a remark; so does the rest of a session
 //! whose card is lost ([`WithSpare`]).
 
-use crate::error::SessionError;
+use crate::ModelError;
 use crate::ingredients::{Element, Ingredients, Relaxation, SolverDevice};
 use crate::measure::tissue::MASS_ADDED;
-use crate::run::clock::Clock;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_budget::Tissue;
@@ -16,6 +15,7 @@ use trepan_gpu::{Gpu, Prefer};
 use trepan_measurements::pulse;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_patient::TissueClass;
+use trepan_patient::progress::Stopwatch;
 use trepan_soft::{Body, BodyError, Loads, Material, SoftSolver, SurfacePressure};
 use trepan_stages::skull_wall::SkullWall;
 use trepan_tled::gpu::WithSpare;
@@ -32,7 +32,7 @@ const TRIAL_MS: f64 = 100.0;
 
 /// What runs as the solver.
 #[derive(Clone, Debug)]
-pub(crate) struct SolverInfo {
+pub struct SolverInfo {
     /// Name of the solver.
     pub name: &'static str,
     /// Where it runs.
@@ -61,12 +61,12 @@ impl SolverInfo {
 
 /// Builds the solver of a body at rest, with the skull around it, if there is one. The body's
 /// materials are the tissue classes, in their order.
-pub(crate) fn build(
+pub fn build(
     body: &Body,
     wall: Option<&mut SkullWall>,
     tissue: &Tissue,
     ingredients: &Ingredients,
-) -> Result<(Box<dyn SoftSolver>, SolverInfo), SessionError> {
+) -> Result<(Box<dyn SoftSolver>, SolverInfo), ModelError> {
     let (solver, ran) = on_any(body, wall, tissue, ingredients)?;
     Ok((solver, SolverInfo { fixed_nodes: body.fixed.len(), ..ran }))
 }
@@ -76,7 +76,7 @@ fn on_any(
     wall: Option<&mut SkullWall>,
     tissue: &Tissue,
     ingredients: &Ingredients,
-) -> Result<(Box<dyn SoftSolver>, SolverInfo), SessionError> {
+) -> Result<(Box<dyn SoftSolver>, SolverInfo), ModelError> {
     if let Some(method) = trepan_soft::Method::named(tissue.solver) {
         return Ok((method.build(body).map_err(refused)?, SolverInfo::here(method.name())));
     }
@@ -108,8 +108,8 @@ fn elsewhere(why: &str) -> String {
     format!("the solver runs on the processor, not on the graphics card: {why}")
 }
 
-fn refused(fault: BodyError) -> SessionError {
-    SessionError::Internal(format!("the brain: {fault}"))
+fn refused(fault: BodyError) -> ModelError {
+    ModelError::Internal(format!("the brain: {fault}"))
 }
 
 impl Ingredients {
@@ -129,7 +129,7 @@ impl Ingredients {
     }
 
     /// Settings of TLED.
-    pub(crate) fn config(&self) -> Config {
+    pub fn config(&self) -> Config {
         Config {
             mass_scaling: MASS_ADDED,
             dynamic_mass_scaling: self.dynamic_mass_scaling,
@@ -149,7 +149,7 @@ fn on_processor(
     mut wall: Option<&mut SkullWall>,
     config: &Config,
     ingredients: &Ingredients,
-) -> Result<Tled, SessionError> {
+) -> Result<Tled, ModelError> {
     let mut solver = Tled::new(body, config).map_err(refused)?;
     let mmhg = ingredients.surface_pressure_mmhg;
     if mmhg > 0.0 {
@@ -162,7 +162,7 @@ fn on_processor(
         }
         let Settled { left_mm, last, .. } = settled;
         if left_mm > AT_REST_MM || last.inverted > 0 {
-            return Err(SessionError::Usage(format!(
+            return Err(ModelError::Usage(format!(
                 "--set surface-pressure={mmhg}: the brain does not come to rest under it, with {} elements inverted \
                  and {left_mm:.2} mm to go: give less, or --set law=neo-hookean",
                 last.inverted
@@ -181,14 +181,14 @@ fn wet(body: &Body) -> Vec<[u32; 3]> {
 }
 
 /// Tries both devices for a time, if there is a card.
-fn is_faster_on_card(body: &Body, config: &Config) -> Result<bool, SessionError> {
+fn is_faster_on_card(body: &Body, config: &Config) -> Result<bool, ModelError> {
     if Gpu::open(Prefer::Hardware).map_or(true, |gpu| gpu.is_software()) {
         return Ok(false);
     }
-    let clock = Clock::start();
+    let clock = Stopwatch::start();
     let all = choice::candidates(body, config);
     let chosen = choice::fastest(&all, &Loads::default(), TRIAL_MS, &|| clock.now_ms());
-    let chosen = chosen.map_err(|fault| SessionError::Internal(format!("the brain: {fault}")))?;
+    let chosen = chosen.map_err(|fault| ModelError::Internal(format!("the brain: {fault}")))?;
     tracing::info!("solver {}: {}", chosen.name, chosen.why);
     Ok(chosen.name != "tled")
 }

@@ -30,7 +30,7 @@ const MOONEY_RATIO: f32 = brain_living::MOONEY_RATIO.f32();
 
 impl Law {
     /// Material of this law for a class and a Young's modulus of brain, MPa.
-    pub(crate) fn material(self, class: TissueClass, brain_mpa: f32) -> Material {
+    pub fn material(self, class: TissueClass, brain_mpa: f32) -> Material {
         let other = class.material(brain_mpa);
         let (poisson, density_g_mm3) = (other.poisson(), other.density_g_mm3());
         let (young_mpa, shear_mpa) = (other.young_mpa() as f32, other.shear_mpa() as f32);

@@ -13,11 +13,11 @@
 //! # When not to use it
 //! To judge the CT itself: what the scanner has blurred is unknown.
 
-use crate::run::clock::Clock;
 use glam::{DAffine3, DVec3};
 use trepan_bone::BoneVolume;
 use trepan_budget::{Bone, Scene};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile};
+use trepan_patient::progress::Stopwatch;
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone as ExactBone, Scan};
 use trepan_rigid::{Method, RigidStep};
@@ -169,7 +169,7 @@ impl<'a> Stretch<'a> {
     fn follow(&self, method: &Method, bone: &BoneVolume, path: &[ToolState], cuts: bool) -> (Vec<Vec3>, f64) {
         let mut contact = method.build(&Tool::burr(self.slide.scene.tool_radius_mm as f32));
         contact.reset(path[0].world_from_tool);
-        let (mut out, mut us, clock) = (RigidStep::default(), 0.0, Clock::start());
+        let (mut out, mut us, clock) = (RigidStep::default(), 0.0, Stopwatch::start());
         let stiffness = self.slide.scene.stiffness as f32;
         let tick = |tool: &ToolState| {
             let began_ms = clock.now_ms();

@@ -326,7 +326,7 @@ const FRICTION_ON_BONE: &str = "0.3";
 /// The law that is fitted to human brain.
 const FITTED: &str = "stiffening";
 /// Total Lagrangian explicit dynamics.
-pub(super) const TLED: &str = "tled";
+pub(crate) const TLED: &str = "tled";
 /// TLED where it is faster on this machine.
 const FASTEST: &str = "fastest";
 
@@ -461,7 +461,7 @@ fn shaft(i: &mut Ingredients, text: &str) -> Option<()> {
 }
 
 /// Whether a method of contact with bone feels the shaft.
-pub(super) fn has_shaft(rigid: &str) -> bool {
+pub(crate) fn has_shaft(rigid: &str) -> bool {
     trepan_rigid::Method::named(rigid).is_some_and(|method| method.descriptor().extent == Extent::BallAndShaft)
 }
 

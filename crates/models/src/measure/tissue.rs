@@ -18,9 +18,8 @@
 //! solvers is a ratio of times in one run.
 
 use super::bone::Slide;
-use crate::error::SessionError;
+use crate::ModelError;
 use crate::ingredients::{DYNAMIC_MASS_SCALING, Element};
-use crate::run::clock::Clock;
 use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::TriMesh;
 use trepan_budget::{Scene, Tissue, TissueForce, dt_ms};
@@ -29,6 +28,7 @@ use trepan_deformable::{Config as Touch, TissueCollision, TissueStep};
 use trepan_geometry::{Pose, Tool, ToolState, Twist, Vec3, quantile};
 use trepan_mesh::{Surface, TetMesh, lattice};
 use trepan_patient::Fineness;
+use trepan_patient::progress::Stopwatch;
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver};
 use trepan_tled::{Config, Damping, Tled};
 use trepan_volume::{DistanceField, VoxelVolume};
@@ -130,7 +130,7 @@ impl<'a> Brains<'a> {
     ///
     /// # Errors
     /// If the mask cannot be meshed.
-    pub fn of(shape: &'a Shape, choices: &[Tissue], element: Element) -> Result<Self, SessionError> {
+    pub fn of(shape: &'a Shape, choices: &[Tissue], element: Element) -> Result<Self, ModelError> {
         let coarsest = lattice::Config { target_tets: TETS[0], ..lattice::Config::default() };
         let labels = shape.mask.map(|voxel| u16::from(voxel != 0));
         let domain = lattice::Domain::of(&labels, &coarsest).map_err(brain_error)?;
@@ -148,7 +148,7 @@ impl<'a> Brains<'a> {
 
     /// Creates the solver of a choice; also returns its cost in a session over that without
     /// averaged accelerations.
-    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<(Box<dyn SoftSolver>, f64), SessionError> {
+    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<(Box<dyn SoftSolver>, f64), ModelError> {
         if let Some(method) = Method::named(choice.solver) {
             return Ok((method.build(&self.body(mesh)).map_err(brain_error)?, 1.0));
         }
@@ -159,7 +159,7 @@ impl<'a> Brains<'a> {
 
     /// Creates TLED with or without averaged nodal pressure, and with the mass that a session adds
     /// to stiffened elements or without. Accelerations are not averaged: equilibria stay.
-    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, as_session: bool) -> Result<Tled, SessionError> {
+    fn tled(&self, mesh: &TetMesh, averaged_pressure: bool, as_session: bool) -> Result<Tled, ModelError> {
         let config = Config {
             mass_scaling: MASS_ADDED,
             dynamic_mass_scaling: if as_session { DYNAMIC_MASS_SCALING } else { 1.0 },
@@ -175,13 +175,13 @@ impl<'a> Brains<'a> {
     }
 }
 
-fn meshed(domain: &lattice::Domain, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, SessionError> {
+fn meshed(domain: &lattice::Domain, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, ModelError> {
     let config = lattice::Config::with_opening(target_tets, fine);
     domain.labelled(&config).map(|labelled| labelled.mesh).map_err(brain_error)
 }
 
-fn brain_error(fault: impl std::fmt::Display) -> SessionError {
-    SessionError::Internal(format!("measuring the brain: {fault}"))
+fn brain_error(fault: impl std::fmt::Display) -> ModelError {
+    ModelError::Internal(format!("measuring the brain: {fault}"))
 }
 
 /// A push of the tool, with the ground truth of what the hand feels and the eye sees.
@@ -212,7 +212,7 @@ impl Push {
     ///
     /// # Errors
     /// If the mask cannot be meshed.
-    pub fn of(slide: &Slide, brains: &Brains, truth: Fineness) -> Result<Self, SessionError> {
+    pub fn of(slide: &Slide, brains: &Brains, truth: Fineness) -> Result<Self, ModelError> {
         let shape = brains.shape;
         let around = |n: usize| {
             let turn = core::f32::consts::TAU * n as f32 / 12.0;
@@ -238,7 +238,7 @@ impl Push {
         brains: &Brains,
         fineness: Fineness,
         averaged_pressure: bool,
-    ) -> Result<Measurement, SessionError> {
+    ) -> Result<Measurement, ModelError> {
         let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
         let mut tled = brains.tled(&mesh, averaged_pressure, true)?;
         let cost = tled.averaged_cost();
@@ -249,7 +249,7 @@ impl Push {
     ///
     /// # Errors
     /// If a solver refuses the mesh.
-    pub fn measure(&self, brains: &Brains) -> Result<Vec<Measurement>, SessionError> {
+    pub fn measure(&self, brains: &Brains) -> Result<Vec<Measurement>, ModelError> {
         let one = |choice: &Tissue| {
             let (tets, halvings) = (choice.tets, choice.halvings);
             let refined = (halvings > 0)
@@ -269,7 +269,7 @@ impl Push {
         mesh: &TetMesh,
         (solver, cost): (&mut dyn SoftSolver, f64),
         longest_ms: f32,
-    ) -> Result<Measurement, SessionError> {
+    ) -> Result<Measurement, ModelError> {
         let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
         let (step_cost, dt_ms, ns) = (cost * found.substeps, found.dt_ms, found.ns);
         Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), step_cost, dt_ms, ns })
@@ -314,7 +314,7 @@ impl Push {
 }
 
 /// Builds a mesh refined around a place.
-fn refined(domain: &lattice::Domain, fineness: Fineness, place: Vec3, normal: Vec3) -> Result<TetMesh, SessionError> {
+fn refined(domain: &lattice::Domain, fineness: Fineness, place: Vec3, normal: Vec3) -> Result<TetMesh, ModelError> {
     meshed(domain, fineness.tets, fineness.fine(place, normal))
 }
 
@@ -326,7 +326,7 @@ fn run(
     mesh: &TetMesh,
     solver: &mut dyn SoftSolver,
     longest_ms: f32,
-) -> Result<Pushed, SessionError> {
+) -> Result<Pushed, ModelError> {
     let ball = Ball { slide, normal, ends };
     let mut contact = BallContact::new(mesh, ball.at(0.0).radius_mm)?;
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
@@ -340,7 +340,7 @@ fn run(
                 *force_n = contact.press(&ball.at(now), TURN_MS, solver, &mut loads.contacts);
                 next += TURN_MS;
             }
-            let clock = Clock::start();
+            let clock = Stopwatch::start();
             let dt_ms = solver.next_dt_ms().min(longest_ms);
             substeps += solver.step(&loads, dt_ms).substeps;
             step_ms += clock.now_ms();
@@ -412,7 +412,7 @@ impl BallContact {
     ///
     /// # Errors
     /// If the mesh has no surface.
-    pub fn new(mesh: &TetMesh, radius_mm: f32) -> Result<Self, SessionError> {
+    pub fn new(mesh: &TetMesh, radius_mm: f32) -> Result<Self, ModelError> {
         let collision = TissueCollision::new(mesh, &Tool::probe(radius_mm), &Touch::default()).map_err(brain_error)?;
         Ok(Self { collision, out: TissueStep::default(), before: None })
     }
@@ -456,14 +456,14 @@ impl Surroundings {
     ///
     /// # Errors
     /// If there is none.
-    pub fn of(mesh: &TetMesh, place: Vec3) -> Result<Self, SessionError> {
+    pub fn of(mesh: &TetMesh, place: Vec3) -> Result<Self, ModelError> {
         let near = |t: &[u32; 3]| t.iter().any(|&n| mesh.positions[n as usize].distance(place) < 40.0);
         let triangles: Vec<[u32; 3]> = Surface::of(mesh).triangles.into_iter().filter(near).collect();
         TriMesh::new(mesh.positions.clone(), triangles).map(Self).map_err(brain_error)
     }
 
     /// The same with its nodes elsewhere.
-    fn moved(&self, positions: &[Vec3]) -> Result<Self, SessionError> {
+    fn moved(&self, positions: &[Vec3]) -> Result<Self, ModelError> {
         TriMesh::new(positions.to_vec(), self.0.indices().to_vec()).map(Self).map_err(brain_error)
     }
 
