@@ -46,13 +46,8 @@ mod whole;
 pub use command::command;
 pub use error::SessionError;
 pub use options::Options;
-pub use report::plan_comparison::PlanComparison;
 pub use report::summary::Summary;
 pub use run::Stages;
 pub use session::Session;
-pub use trepan_patient::{Inputs, PatientError, TissueSource};
-pub use trepan_stages::{
-    CollisionStage, HapticConfig, HapticStage, Hindrance, Limits, Notice, Phase, Program, ScoreKeeper, Settling,
-    SkullWall, SoftFrame, SolverFaults, SolverStage, TickInput, ToolSample, Warning, What, dry_weight,
-};
-pub use uncertainty::{Band, Bands};
+pub use trepan_patient::{Inputs, TissueSource};
+pub use trepan_stages::Program;

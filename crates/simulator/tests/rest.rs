@@ -4,8 +4,8 @@
 use trepan_contact::NodalContacts;
 use trepan_deformable::SlidingWall;
 use trepan_geometry::Vec3;
-use trepan_simulator::SolverStage;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_stages::SolverStage;
 use trepan_tled::{Config, Tled};
 
 /// Makes a slab of brain, 12 x 12 x 4 mm, fixed at its upper side; nodes weigh 0.0004 to 0.001 g.

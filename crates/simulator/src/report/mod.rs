@@ -8,7 +8,6 @@ pub(crate) mod film;
 pub(crate) mod kept;
 pub(crate) mod output;
 pub(crate) mod page;
-pub(crate) mod plan_comparison;
 pub(crate) mod regions;
 pub(crate) mod sessions;
 pub(crate) mod slicer;

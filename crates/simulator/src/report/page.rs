@@ -284,7 +284,7 @@ mod tests {
         let notice = |time_ms, what| Notice { tick: 0, time_ms, what };
         let mut outcome = Outcome::default();
         outcome.written.notices = vec![
-            notice(10.0, What::Phase(crate::Phase::Craniotomy)),
+            notice(10.0, What::Phase(trepan_stages::Phase::Craniotomy)),
             notice(4000.0, What::Warning(Warning::BrainNear, true, 1.0)),
             notice(4500.0, What::Warning(Warning::BrainNear, false, 1.0)),
             notice(3000.0, What::Through),

@@ -1,7 +1,6 @@
 //! `summary.json`: the results of a session as numbers.
 
 use crate::models::ModelSummary;
-use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
 use crate::run::{Outcome, Quantiles, Replayed, SolverOutcome};
 use crate::uncertainty::Bands;
@@ -11,6 +10,7 @@ use std::fs;
 use trepan_bone::Piece;
 use trepan_contact::GuardCounters;
 use trepan_patient::Plan;
+use trepan_patient::PlanComparison;
 use trepan_stages::alarms::REAL_TIME;
 use trepan_stages::by_cause;
 use trepan_stages::notice::{Notice, What};

@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn the_layout_for_foxglove_plots_what_a_recording_has() {
         let layout = include_str!("../../../link/foxglove-layout.json");
-        let scores = serde_json::to_value(crate::ScoreKeeper::default()).unwrap();
+        let scores = serde_json::to_value(trepan_stages::ScoreKeeper::default()).unwrap();
         let plotted: Vec<&str> = layout.split('"').filter_map(|text| text.strip_prefix("/score.")).collect();
         assert!(plotted.len() >= 3 && plotted.iter().all(|name| scores.get(name).is_some()), "{plotted:?}");
     }

@@ -17,7 +17,6 @@ use crate::run::clock::{Clock, Schedule, Waits};
 use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
 use crate::run::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
-use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_contact::{GuardedWrench, SurfacePatch};
@@ -30,6 +29,7 @@ use trepan_soft::Loads;
 use trepan_stages::alarms;
 use trepan_stages::haptic_tick::{HapticStage, Tick, TickInput};
 use trepan_stages::second_hand::{SecondHand, SecondView};
+use trepan_stages::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 
 /// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;

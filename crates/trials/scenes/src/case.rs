@@ -4,7 +4,7 @@ use anyhow::Result;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_patient::{Cache, Inputs, Plan, Recipe, Scene, TissueSource, open_case};
-use trepan_simulator::Program;
+use trepan_stages::Program;
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// The built-in case's files.

@@ -11,8 +11,8 @@ use trepan_geometry::Vec3;
 use trepan_measurements::{brain_living, brain_membranes, fits, hands, sensitivity};
 use trepan_mesh::Surface;
 use trepan_patient::TissueClass;
-use trepan_simulator::{HapticConfig, Program};
 use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, boxes};
+use trepan_stages::{HapticConfig, Program};
 use trepan_tled::{Config, Relaxation, Tled};
 
 /// Megapascals in a kilopascal.

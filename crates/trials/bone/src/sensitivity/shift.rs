@@ -11,8 +11,8 @@ use super::scene::{Input, OUTPUTS, Scene};
 use trepan_geometry::{Vec3, units};
 use trepan_measurements::support;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_simulator::{Phase, Settling};
 use trepan_soft::{Anchor, Body, Loads, SoftSolver, boxes};
+use trepan_stages::{Phase, Settling};
 use trepan_tled::{Config, Relaxation, Tled};
 
 /// Half the axes of the ellipsoid, mm.

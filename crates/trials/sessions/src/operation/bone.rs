@@ -24,7 +24,7 @@ use trepan_patient::{Cache, Recipe, Scene, open_case};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone, Scan};
 use trepan_rigid::{Method, RigidStep};
-use trepan_simulator::Program;
+use trepan_stages::Program;
 use trepan_trials_bone::rigid;
 use trepan_trials_scenes::case;
 use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample, skull_only};

@@ -29,7 +29,8 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_evidence::worst::{self, Rank};
 use trepan_geometry::Vec3;
 use trepan_patient::Inputs;
-use trepan_simulator::{Options, Program, Session};
+use trepan_simulator::{Options, Session};
+use trepan_stages::Program;
 use trepan_trials_scenes::population::{BaseHead, Files, Head, HeadRecipe, base_heads};
 use trepan_volume::{VoxelVolume, nifti, resample};
 
@@ -272,6 +273,7 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
         ("operations with a jump over 0.05 mm in a millisecond without touch", all("jump_mm", &over(JUMP_MM))),
         ("operations with motion over 0.02 mm in a step at rest", all("rest_motion_mm", &over(0.02))),
         ("operations with inverted elements", all("inverted", &over(0.0))),
+        ("operations in which the solver skipped time", all("skipped_ms", &over(0.0))),
         ("operations with nodes that were not finite", all("non_finite", &over(0.0))),
         ("operations with nodes clamped to a limit", all("limited", &over(0.0))),
         ("operations with contacts left out", all("contacts_left_out", &over(0.0))),
@@ -310,6 +312,7 @@ mod tests {
             ("jump_mm", 0.01),
             ("rest_motion_mm", 0.01),
             ("inverted", 0.0),
+            ("skipped_ms", 0.0),
             ("non_finite", 0.0),
             ("limited", 0.0),
             ("contacts_left_out", 0.0),
@@ -338,6 +341,7 @@ mod tests {
             ("jump_mm", f64::NAN),
             ("rest_motion_mm", 0.03),
             ("inverted", 1.0),
+            ("skipped_ms", 2.0),
             ("non_finite", 1.0),
             ("limited", 1.0),
             ("contacts_left_out", 1.0),

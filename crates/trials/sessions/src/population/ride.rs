@@ -13,8 +13,9 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Plan, Script};
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{Notice, Phase, Session, SoftFrame, SolverFaults, Stages, TickInput, Warning, What};
+use trepan_simulator::{Session, Stages};
 use trepan_soft::Loads;
+use trepan_stages::{Notice, Phase, SoftFrame, SolverFaults, TickInput, Warning, What};
 
 /// Presses of the probe, mm.
 const PRESSES_MM: [f32; 3] = [4.0, 6.0, 8.0];

@@ -19,7 +19,7 @@ use anyhow::Result;
 use trepan_evidence::part::Scope;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, Site};
-use trepan_simulator::Program;
+use trepan_stages::Program;
 
 /// Over the place that is opened, RAS mm: the same in every run.
 pub const OPENING: Vec3 = Vec3::new(108.0, 8.0, 84.0);
@@ -65,7 +65,7 @@ fn disc(site: &Site, radius_mm: f32) -> impl Iterator<Item = Vec3> {
 pub(crate) mod tests {
     use super::surface::Look;
     use super::*;
-    use trepan_simulator::SolverFaults;
+    use trepan_stages::SolverFaults;
 
     /// A run of a second: bone for half of it, then the probe on a plane that dips.
     pub fn hand_made(newtons: f32, depth_mm: f32, dip_mm: f32, gone: usize) -> Ride {

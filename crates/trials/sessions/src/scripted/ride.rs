@@ -14,7 +14,8 @@ use trepan_geometry::{ToolState, Vec3};
 use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{Reading, Status};
 use trepan_mesh::Surface;
-use trepan_simulator::{Options, Phase, Program, Session, SoftFrame, SolverFaults, Stages, TickInput, ToolSample};
+use trepan_simulator::{Options, Session, Stages};
+use trepan_stages::{Phase, Program, SoftFrame, SolverFaults, TickInput, ToolSample};
 use trepan_trials_scenes::case;
 
 /// Radius around the way in within which bone is counted, mm: the hole and its rim.

@@ -7,7 +7,7 @@ use trepan_geometry::ToolState;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{HapticConfig, HapticStage, Notice, Program, TickInput, Warning, What};
+use trepan_stages::{HapticConfig, HapticStage, Notice, Program, TickInput, Warning, What};
 use trepan_volume::DistanceField;
 
 /// What a tick without tissue is given.

@@ -16,10 +16,10 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_patient::{Cache, RestBrain, Scene, TissueClass, open_case};
-use trepan_simulator::{
+use trepan_soft::{Body, Loads};
+use trepan_stages::{
     CollisionStage, HapticStage, Phase, Program, Settling, SoftFrame, SolverStage, TickInput, ToolSample,
 };
-use trepan_soft::{Body, Loads};
 use trepan_trials_scenes::case;
 
 /// How fast and how deep the probe is pressed in.

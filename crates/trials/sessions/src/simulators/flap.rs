@@ -6,7 +6,8 @@ use trepan_bone::Piece;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_haptics::script::{Plan, Script};
 use trepan_haptics::simulated::HandModel;
-use trepan_simulator::{PlanComparison, Program, What};
+use trepan_patient::PlanComparison;
+use trepan_stages::{Program, What};
 use trepan_trials_scenes::case::CaseFixture;
 
 /// Duration of the operation, ms.

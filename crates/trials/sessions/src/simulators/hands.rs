@@ -14,7 +14,8 @@ use trepan_haptics::script::{Plan, Script};
 use trepan_haptics::simulated::HandModel;
 use trepan_haptics::{Capabilities, HapticDevice, Reading};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{Limits, PlanComparison, Program, ScoreKeeper, Warning, What};
+use trepan_patient::PlanComparison;
+use trepan_stages::{Limits, Program, ScoreKeeper, Warning, What};
 use trepan_trials_scenes::case::CaseFixture;
 
 /// Duration of an operation, ms.

@@ -20,7 +20,7 @@ use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
 use trepan_haptics::simulated::HandModel;
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{Program, Warning};
+use trepan_stages::{Program, Warning};
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Edge of the piece of skull, mm.

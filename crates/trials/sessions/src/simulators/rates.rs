@@ -6,7 +6,7 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_haptics::script::Script;
 use trepan_haptics::simulated::HandModel;
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{Program, ScoreKeeper};
+use trepan_stages::{Program, ScoreKeeper};
 use trepan_trials_scenes::case::CaseFixture;
 
 /// Ticks a second that an operation of 1000 is thinned to.

@@ -9,7 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use trepan_evidence::part::Scope;
 use trepan_evidence::suite::{Findings, Gate, Row};
-use trepan_simulator::{Options, Program, Session, Summary};
+use trepan_simulator::{Options, Session, Summary};
+use trepan_stages::Program;
 use trepan_trials_scenes::case;
 
 /// Memory that a session may come to hold in half an hour, MB.

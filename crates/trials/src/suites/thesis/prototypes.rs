@@ -20,8 +20,8 @@ use trepan_evidence::timer::Samples;
 use trepan_geometry::{Vec3, units};
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData, SliceLook};
-use trepan_simulator::Phase;
 use trepan_soft::{Body, Loads, Material, SoftSolver};
+use trepan_stages::Phase;
 use trepan_tled::{Config, Tled};
 
 /// Size of a picture on the page, pixels.

@@ -18,8 +18,8 @@ use trepan_budget::Quality;
 use trepan_contact::NodalContacts;
 use trepan_models::Ingredients;
 use trepan_patient::{Cache, Plan, RestBrain, Scene, TissueClass, open_case};
-use trepan_simulator::{Program, SkullWall};
 use trepan_soft::{Body, Loads, SoftSolver};
+use trepan_stages::{Program, SkullWall};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
 use trepan_trials_scenes::case;
 

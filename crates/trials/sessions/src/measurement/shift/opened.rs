@@ -6,8 +6,8 @@ use anyhow::Result;
 use trepan_evidence::picture::Series;
 use trepan_evidence::suite::Findings;
 use trepan_measurements::{Row, pulse, shift, support};
-use trepan_simulator::{Phase, Settling};
 use trepan_soft::Loads;
+use trepan_stages::{Phase, Settling};
 
 /// When the cortex is looked at, minutes after the dura was opened.
 const MINUTES: [f64; 9] = [0.5, 5.0, 10.0, 20.0, 35.0, shift::TIME_DURING.value, 75.0, shift::TIME_END.value, 150.0];

@@ -16,11 +16,11 @@
 //! L. R. Dice, Ecology 26 (1945); 95 % Hausdorff distance: D. P. Huttenlocher et al., IEEE PAMI 15
 //! (1993), as in A. A. Taha, A. Hanbury, BMC Medical Imaging 15 (2015).
 
+use crate::Plan;
 use glam::IVec3;
 use serde::Serialize;
 use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
-use trepan_patient::Plan;
 
 /// Overlap and surface distance of the removed and the planned bone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
