@@ -16,7 +16,7 @@ const FLOORS: [&[&str]; 11] = [
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget", "window", "evidence", "stages"],
-    &["patient"],
+    &["patient", "runtime"],
     &["models"],
     &["simulator"],
     &["craniotomy", "brain", "integrated", "trials-scenes"],
@@ -89,7 +89,7 @@ fn short(package: &str) -> &str {
 /// The crates of trials, and those that a session consists of, are kept to the same as one.
 fn group(name: &str) -> &str {
     match name {
-        "patient" | "models" => "simulator",
+        "patient" | "models" | "runtime" => "simulator",
         _ if name.starts_with("trials-") => "trials",
         _ => name,
     }

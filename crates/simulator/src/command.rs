@@ -14,7 +14,6 @@ use crate::printable::{columns, count, printable};
 use crate::recordings;
 use crate::report::summary::{CutOff, behind, slow};
 use crate::report::{film, sessions, ticks};
-use crate::run::Quantiles;
 use crate::session::{Place, Session, SessionResult};
 use crate::show::driver;
 use crate::{Inputs, Options, Program, SessionError};
@@ -23,6 +22,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 use trepan_models::ingredients::table;
+use trepan_runtime::Quantiles;
 use trepan_volume::dicom::Series;
 use trepan_window::display;
 

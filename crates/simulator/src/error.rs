@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use trepan_models::ModelError;
 use trepan_patient::PatientError;
+use trepan_runtime::WatchError;
 
 /// Error that keeps a session from starting or from writing its files. Errors that the user can
 /// correct exit with 2, others with 1.
@@ -58,6 +59,12 @@ impl SessionError {
             Self::Model(fault) if fault.is_internal() => 1,
             _ => 2,
         }
+    }
+}
+
+impl From<WatchError> for SessionError {
+    fn from(fault: WatchError) -> Self {
+        Self::Usage(fault.to_string())
     }
 }
 

@@ -2,8 +2,6 @@
 
 use crate::error::SessionError;
 use crate::options::Options;
-use crate::run::stop::Stop;
-use crate::run::watch::{Watched, Watching};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, ScriptError, Site};
 use trepan_haptics::{
@@ -11,6 +9,8 @@ use trepan_haptics::{
     mouse,
 };
 use trepan_patient::Plan;
+use trepan_runtime::stop::Stop;
+use trepan_runtime::watch::{Watched, Watching};
 use trepan_stages::program::Program;
 
 /// An open device of a hand.

@@ -1,14 +1,6 @@
 //! Runs a simulation session from its flags to its files: threads, clocks, phases, warnings,
 //! scores, recording.
 //!
-//! # Theory
-//! Three loops run in parallel and exchange their newest values without waiting: the haptic tick at
-//! 1 kHz or more, the collision step and the solver step. A fourth thread renders. The body of each
-//! loop is a stage without a clock, in `trepan-stages`.
-//!
-//! `run/threads.rs` runs the stages live; `run/lockstep` replays them from a recording, bit for
-//! bit.
-//!
 //! # Practice
 //! [`Session::open`] reports every user error before anything is written; [`Session::run`] runs the
 //! session and writes its files.
@@ -33,8 +25,9 @@ mod operation;
 mod options;
 mod printable;
 mod recordings;
+#[cfg(test)]
+mod replay_tests;
 mod report;
-mod run;
 mod session;
 mod session_setup;
 mod settings;
@@ -47,7 +40,7 @@ pub use command::command;
 pub use error::SessionError;
 pub use options::Options;
 pub use report::summary::Summary;
-pub use run::Stages;
 pub use session::Session;
 pub use trepan_patient::{Inputs, TissueSource};
+pub use trepan_runtime::Stages;
 pub use trepan_stages::Program;

@@ -16,13 +16,6 @@ use crate::report::kept::SessionFolder;
 use crate::report::page::Shot;
 use crate::report::summary::{CutOff, Machine, Opening, SecondSummary, SolverSummary, Summary, fps};
 use crate::report::{film, output, slicer};
-use crate::run::film::{self as filmed, Filming};
-use crate::run::lesson::{Teacher, TeacherButtons};
-use crate::run::lockstep;
-use crate::run::stop::Stop;
-use crate::run::threads::{self, Devices, Pace};
-use crate::run::watch::{self, PeerSession, Share, TeacherRequests};
-use crate::run::{Outcome, RenderInputs, Run, Stages, View};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
 use crate::show::graphics::{Graphics, NoPicture};
@@ -46,6 +39,13 @@ use trepan_patient::identity::Identity;
 use trepan_patient::progress::Progress;
 use trepan_patient::{self as patient, Inputs, PatientError};
 use trepan_render::Camera;
+use trepan_runtime::film::{self as filmed, Filming};
+use trepan_runtime::lesson::{Teacher, TeacherButtons};
+use trepan_runtime::lockstep;
+use trepan_runtime::stop::Stop;
+use trepan_runtime::threads::{self, Devices, Pace};
+use trepan_runtime::watch::{self, PeerSession, Share, TeacherRequests};
+use trepan_runtime::{Outcome, RenderInputs, Run, Stages, View};
 use trepan_stages::haptic_tick::ToolSample;
 use trepan_stages::program::Program;
 use trepan_volume::VoxelVolume;
@@ -562,7 +562,7 @@ impl Session {
 /// Waits for the header of the session that is watched; a recording of nothing else.
 fn watched(name: &str, case: &Identity, progress: &Progress) -> Result<Recording, SessionError> {
     let header = watch::header(name, || progress.is_over());
-    let header = if progress.is_over() { Err(SessionError::Patient(PatientError::Cancelled)) } else { header }?;
+    let header = if progress.is_over() { Err(SessionError::Patient(PatientError::Cancelled)) } else { Ok(header?) }?;
     recordings::of_watched(name, header, case)
 }
 

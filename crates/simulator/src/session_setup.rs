@@ -5,7 +5,6 @@ use crate::error::SessionError;
 use crate::models::Models;
 use crate::operation::Operation;
 use crate::report::regions::{Region, regions};
-use crate::run::{self, Stages};
 use std::sync::{Arc, OnceLock};
 use trepan_bone::{BoneVolume, Piece};
 use trepan_budget::Bone;
@@ -21,6 +20,7 @@ use trepan_patient::anchors::BrainSupport;
 use trepan_patient::remark;
 use trepan_patient::{RestBrain, Scene};
 use trepan_rigid::{Extent, Method};
+use trepan_runtime::{Stages, Tissue};
 use trepan_stages::collision_step::CollisionStage;
 use trepan_stages::haptic_config::{BONE, HapticConfig, TISSUE};
 use trepan_stages::haptic_tick::HapticStage;
@@ -183,7 +183,7 @@ impl SessionSetup {
         .map_err(|fault| brain_error(&fault))
     }
 
-    fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
+    fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<Tissue, SessionError> {
         let (BrainSupport { fixed, anchors, mut wall }, settling) = self.held(brain)?;
         let body = brain.body(with.materials(self.young_mpa), with.pia_arachnoid_n_per_mm, &fixed, &anchors);
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
@@ -195,7 +195,7 @@ impl SessionSetup {
             .under_pressure(with.surface_pressure_mmhg > 0.0)
             .turning(rigid.descriptor().extent == Extent::BallAndShaft)
             .settling(settling);
-        Ok(run::Tissue { collision, solver: SolverStage::new(solver) })
+        Ok(Tissue { collision, solver: SolverStage::new(solver) })
     }
 }
 

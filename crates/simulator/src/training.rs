@@ -5,12 +5,12 @@
 //! `lessons` beside the settings. Targets of steps are read from the running session, pass marks
 //! from its summary. The limits are a teacher's choice; none is validated against clinical skill.
 
-use crate::run::View;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use trepan_runtime::View;
 use trepan_stages::program::Program;
 
 /// A lesson.

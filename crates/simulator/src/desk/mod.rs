@@ -23,10 +23,10 @@ pub(crate) use job::Done;
 
 use crate::error::SessionError;
 use crate::options::Options;
-use crate::run::stop::Stop;
 use crate::show::driver;
 use crate::{Inputs, desk::language::Languages, desk::state::App};
 use trepan_patient::PatientError;
+use trepan_runtime::stop::Stop;
 use trepan_stages::program::Program;
 use trepan_window as window;
 

@@ -16,7 +16,6 @@ use crate::desk::results::{self, Sessions};
 use crate::error::SessionError;
 use crate::options::Options;
 use crate::report::kept::SessionFolder;
-use crate::run::stop::Stop;
 use crate::session::{Place, Session};
 use crate::settings::{Recent, Source, sessions};
 use crate::training::Lesson;
@@ -28,6 +27,7 @@ use trepan_haptics::Listed;
 use trepan_patient::Cache;
 use trepan_patient::progress::Progress;
 use trepan_patient::{Case, PatientError};
+use trepan_runtime::stop::Stop;
 use trepan_stages::program::Program;
 use trepan_window::{Content, Host, Page, Stage, speak};
 

@@ -78,7 +78,7 @@ fn floor(floor: &Floor) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::Quantiles;
+    use trepan_runtime::Quantiles;
 
     #[test]
     fn a_fast_rate_is_good_and_a_slow_or_uneven_one_is_not() {

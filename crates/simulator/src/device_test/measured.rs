@@ -5,10 +5,10 @@
 
 use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part, Trial};
 use crate::report::summary::Machine;
-use crate::run::{Quantiles, Times};
 use serde::Serialize;
 use trepan_contact::GuardCounters;
 use trepan_geometry::Vec3;
+use trepan_runtime::{Quantiles, Times};
 use trepan_stages::by_cause;
 
 /// One tick of the test.

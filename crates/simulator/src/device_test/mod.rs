@@ -14,9 +14,6 @@ mod trial;
 
 use crate::error::SessionError;
 use crate::report::summary::Machine;
-use crate::run::clock::{Clock, Schedule, Waits};
-use crate::run::stop::Stop;
-use crate::run::threads::{HapticDeviceOwner, real_time};
 use crate::whole::whole;
 use measured::{Ending, Floor, Measured, Sample, TestRun, Timing};
 use std::fmt::Display;
@@ -29,6 +26,9 @@ use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{
     Capabilities, DeviceName, HapticDevice, Motion, NameError, OpenedDevice, Setting, Status, Watch, Workspace,
 };
+use trepan_runtime::clock::{Clock, Schedule, Waits};
+use trepan_runtime::stop::Stop;
+use trepan_runtime::threads::{HapticDeviceOwner, real_time};
 use trial::{Part, Trial};
 
 /// Largest number of ticks in which the force fades at the end.

@@ -5,8 +5,8 @@ use crate::device_test::trial::Part;
 use crate::error::SessionError;
 use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
 use crate::report::page::{Table, render, rows};
-use crate::run::Times;
 use serde_json::json;
+use trepan_runtime::Times;
 
 /// Builds the page.
 pub(super) fn html(found: &Measured, samples: &[Sample]) -> Result<String, SessionError> {

@@ -6,7 +6,6 @@ use crate::report::drilled::{self, Drilled};
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
 use crate::report::{csv, slicer};
-use crate::run::Outcome;
 use crate::whole::whole;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -17,6 +16,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use trepan_bone::BoneVolume;
 use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
+use trepan_runtime::Outcome;
 use trepan_stages::program::Program;
 use trepan_volume::{VoxelVolume, write_beside};
 

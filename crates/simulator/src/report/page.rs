@@ -7,7 +7,6 @@ use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
 use crate::report::debrief::Debrief;
 use crate::report::summary::{Raised, Summary};
-use crate::run::Outcome;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::value::Serde;
@@ -18,6 +17,7 @@ use trepan_budget::Tissue;
 use trepan_link::Recording;
 use trepan_link::wire::TickRecord;
 use trepan_models::ingredients::KEYS;
+use trepan_runtime::Outcome;
 use trepan_stages::force_scale::ForceScale;
 
 /// A picture for the report.

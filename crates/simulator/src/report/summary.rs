@@ -2,7 +2,6 @@
 
 use crate::models::ModelSummary;
 use crate::report::regions::Region;
-use crate::run::{Outcome, Quantiles, Replayed, SolverOutcome};
 use crate::uncertainty::Bands;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -11,6 +10,7 @@ use trepan_bone::Piece;
 use trepan_contact::GuardCounters;
 use trepan_patient::Plan;
 use trepan_patient::PlanComparison;
+use trepan_runtime::{Outcome, Quantiles, Replayed, SolverOutcome};
 use trepan_stages::alarms::REAL_TIME;
 use trepan_stages::by_cause;
 use trepan_stages::notice::{Notice, What};

@@ -4,9 +4,6 @@
 use crate::SessionError;
 use crate::report::page::Shot;
 use crate::report::summary::MovingSummary;
-use crate::run::clock::Clock;
-use crate::run::stop::Stop;
-use crate::run::{RenderInputs, Times, View};
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use std::path::{Path, PathBuf};
@@ -15,6 +12,9 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_patient::opening::eye;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_runtime::clock::Clock;
+use trepan_runtime::stop::Stop;
+use trepan_runtime::{RenderInputs, Times, View};
 use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;
 

@@ -2,16 +2,12 @@
 //!
 //! # Practice
 //! Pose, tool, forces and depths are those of the recorded tick, at any time at once. Skull and
-//! brain are the session's film ([`crate::run::film`]), read from its file or made while it is
+//! brain are the session's film ([`trepan_runtime::film`]), read from its file or made while it is
 //! shown; then the window says how far it is. Seeking writes the voxels and nodes that changed
 //! in between, some 20 ns each, at most [`MAX_VOXELS`] per picture: a longer jump takes more.
 //! The brain's nodes are interpolated between the shots that hold them.
 
 use crate::printable::capital;
-use crate::run::View;
-use crate::run::film::{Shot, position};
-use crate::run::lockstep::up_to;
-use crate::run::stop::Stop;
 use crate::show::notice_text::NEWS_MS;
 use crate::show::picture::Album;
 use crate::show::window::{self, SessionView, ViewState};
@@ -22,6 +18,10 @@ use trepan_geometry::Vec3;
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::{Camera, Frame, Image, Painter};
+use trepan_runtime::View;
+use trepan_runtime::film::{Shot, position};
+use trepan_runtime::lockstep::up_to;
+use trepan_runtime::stop::Stop;
 use trepan_stages::program::Program;
 use trepan_stages::second_hand::SecondView;
 use trepan_window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
@@ -236,13 +236,21 @@ impl Player {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::film::displacements;
-    use crate::run::film::tests::view;
     use glam::IVec3;
     use std::sync::mpsc::channel;
+    use trepan_geometry::{Pose, ToolState};
     use trepan_link::SceneChange;
     use trepan_link::wire::TickRecord;
+    use trepan_runtime::film::displacements;
+    use trepan_stages::haptic_tick::ToolSample;
     use trepan_volume::VoxelVolume;
+
+    /// View of a tool at the origin.
+    fn view(time_ms: f64) -> View {
+        let tool = Program::Craniotomy.tray()[0];
+        let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
+        View { time_ms, ..View::at(sample, 1.0) }
+    }
 
     /// Makes a film of `count` shots, 10 ms apart. Shot n removes voxel n; every other shot holds
     /// the brain's nodes.

@@ -5,12 +5,12 @@
 //! brain's triangles are tested one by one: all of them for a line of sight, those around the tool
 //! for the short rays below it.
 
-use crate::run::View;
 use crate::session_setup::SessionSetup;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Vec3};
 use trepan_mesh::Surface;
+use trepan_runtime::View;
 use trepan_stages::ahead::{bone_ahead_mm, density};
 use trepan_stages::program::Phase;
 use trepan_window::{Panel, Ray, SurfaceHit};

@@ -6,10 +6,6 @@
 
 use crate::SessionError;
 use crate::report::page::Shot;
-use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
-use crate::run::stop::Stop;
-use crate::run::watch::{PeerSession, Watching};
-use crate::run::{RenderInputs, View};
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
@@ -24,6 +20,10 @@ use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
 use trepan_patient::progress::Progress;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_runtime::lesson::{TEACHER_REQUESTS, Teacher};
+use trepan_runtime::stop::Stop;
+use trepan_runtime::watch::{PeerSession, Watching};
+use trepan_runtime::{RenderInputs, View};
 use trepan_stages::notice::Notice;
 use trepan_stages::program::Program;
 use trepan_window::{self as window, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
@@ -423,10 +423,11 @@ fn teach(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::watch::tests::connected;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use trepan_geometry::ToolState;
     use trepan_haptics::HapticDevice;
-    use trepan_link::cell::cell;
+    use trepan_link::{cell::cell, topics, wire::TickRecord};
+    use trepan_runtime::watch::Watched;
     use trepan_stages::haptic_tick::ToolSample;
     use trepan_window::Pace;
 
@@ -434,6 +435,24 @@ mod tests {
     fn a_trainee_reads_the_requests() {
         let lesson = Lesson::requested(TeacherRecord::PAUSE | TeacherRecord::BLEEDING | TeacherRecord::GHOST);
         assert_eq!(lesson.warnings, [TEACHER_REQUESTS[2].1]);
+    }
+
+    /// Connects a watcher to a session that sends ticks only until the watcher is connected.
+    fn connected(name: &str) -> (Watched, Watching) {
+        let trainee = topics::Session::join(name).unwrap();
+        let mut ticks = trainee.publisher::<TickRecord>().unwrap();
+        let connected = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !connected.load(Ordering::Relaxed) {
+                    ticks.send(&TickRecord { tick: 1, ..TickRecord::default() }).unwrap();
+                    std::thread::sleep(std::time::Duration::from_millis(1));
+                }
+            });
+            let opened = Watched::open(name, ToolState::at(Pose::IDENTITY), &Stop::default());
+            connected.store(true, Ordering::Relaxed);
+            opened.unwrap()
+        })
     }
 
     #[test]

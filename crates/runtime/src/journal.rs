@@ -7,8 +7,8 @@
 //! scores are recorded as numbers once a second and at the end, for viewers of the file. A full
 //! disk ends the recording, not the session.
 
-use crate::run::clock::Clock;
-use crate::run::watch::Share;
+use crate::clock::Clock;
+use crate::watch::Share;
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
@@ -28,7 +28,7 @@ const SCORES_MS: f64 = 1000.0;
 const DRAIN: Duration = Duration::from_millis(5);
 
 /// Send ends of the ring buffers, for the loops.
-pub(crate) struct JournalSenders {
+pub struct JournalSenders {
     /// For the haptic loop.
     pub ticks: Sender<TickRecord>,
     /// For the haptic loop, with a second hand.
@@ -42,7 +42,7 @@ pub(crate) struct JournalSenders {
 }
 
 /// Receive ends of the ring buffers, for the recording thread.
-pub(crate) struct Journal {
+pub struct Journal {
     ticks: Receiver<TickRecord>,
     second: Receiver<SecondRecord>,
     notices: Receiver<Notice>,
@@ -58,7 +58,7 @@ pub(crate) struct Journal {
 
 /// Result of the recording thread.
 #[derive(Debug, Default)]
-pub(crate) struct Written {
+pub struct Written {
     /// Every notice, in order.
     pub notices: Vec<Notice>,
     /// Records that did not fit into a ring buffer.
@@ -78,7 +78,7 @@ impl Written {
 }
 
 /// Makes the ring buffers and returns both ends.
-pub(crate) fn journal(force_scale: ForceScale) -> (JournalSenders, Journal) {
+pub fn journal(force_scale: ForceScale) -> (JournalSenders, Journal) {
     let (ticks, second, notices) = (bounded(RING), bounded(RING), bounded(RING / 8));
     let (collisions, solver) = (bounded(RING), bounded(RING));
     let newest = (0, 0.0);

@@ -26,10 +26,9 @@
 //! (`iox2 tunnel zenoh`, of its command line tools) on both machines to forward the topics
 //! `trepan/NAME/...`; nothing changes here.
 
-use crate::error::SessionError;
-use crate::run::clock::Clock;
-use crate::run::lesson::{Listener, Teacher};
-use crate::run::stop::Stop;
+use crate::clock::Clock;
+use crate::lesson::{Listener, Teacher};
+use crate::stop::Stop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -39,6 +38,11 @@ use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, Topic, TopicError};
 use trepan_link::wire::{EventRecord, SessionHeader, TeacherRecord, TickRecord};
+
+/// Session that cannot be shared or watched, with the flag and the remedy.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct WatchError(String);
 
 /// Time without a new tick after which a reading is stale, ms.
 const STALE_MS: f64 = 100.0;
@@ -50,24 +54,24 @@ const TIMEOUT_S: f64 = 40.0;
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Send end of a shared session, for the recording thread.
-pub(crate) struct Share {
+pub struct Share {
     /// Publishes ticks.
-    pub(super) ticks: Publisher<TickRecord>,
+    pub(crate) ticks: Publisher<TickRecord>,
     /// Publishes events.
-    pub(super) events: Publisher<EventRecord>,
+    pub(crate) events: Publisher<EventRecord>,
     /// Publishes the header.
-    pub(super) headers: Publisher<SessionHeader>,
+    pub(crate) headers: Publisher<SessionHeader>,
     /// Receives the teacher's requests.
-    pub(super) teacher: Listener,
+    pub(crate) teacher: Listener,
     _session: Session,
 }
 
 /// Readers of the teacher's requests: first hand, second hand, window.
-pub(crate) type TeacherRequests = [Reader<TeacherRecord>; 3];
+pub type TeacherRequests = [Reader<TeacherRecord>; 3];
 
 impl Share {
     /// Shares a session under a name; returns also the readers of the teacher's requests.
-    pub fn open(name: &str, header: &SessionHeader) -> Result<(Self, TeacherRequests), SessionError> {
+    pub fn open(name: &str, header: &SessionHeader) -> Result<(Self, TeacherRequests), WatchError> {
         let open = || -> Result<(Self, TeacherRequests), TopicError> {
             let session = Session::join(name)?;
             let (teacher, readers) = Listener::join(&session)?;
@@ -75,12 +79,12 @@ impl Share {
             headers.send(header)?;
             Ok((Self { ticks, events, headers, teacher, _session: session }, readers))
         };
-        open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
+        open().map_err(|fault| WatchError(format!("--share {name}: {fault}")))
     }
 }
 
 /// Another session as a device: receive end of a watcher.
-pub(crate) struct Watched {
+pub struct Watched {
     newest: Reader<TickRecord>,
     seen: u64,
     received_ms: Option<f64>,
@@ -92,7 +96,7 @@ pub(crate) struct Watched {
 
 /// Name of the watched session, and whether it has ended.
 #[derive(Clone)]
-pub(crate) struct Watching {
+pub struct Watching {
     name: String,
     over: Arc<AtomicBool>,
 }
@@ -105,15 +109,15 @@ impl Watching {
 }
 
 /// Waits for the header of the session of a name, until it is `over`.
-pub(crate) fn header(name: &str, over: impl Fn() -> bool) -> Result<SessionHeader, SessionError> {
-    let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
+pub fn header(name: &str, over: impl Fn() -> bool) -> Result<SessionHeader, WatchError> {
+    let fault = |fault: TopicError| WatchError(format!("--watch {name}: {fault}"));
     let session = Session::join(name).map_err(fault)?;
     let mut headers: Subscriber<SessionHeader> = session.subscriber().map_err(fault)?;
     first(name, &mut headers, over)
 }
 
 /// Waits for the first record of a topic, until it is `over`, and logs the wait.
-fn first<T: Topic>(name: &str, topic: &mut Subscriber<T>, over: impl Fn() -> bool) -> Result<T, SessionError> {
+fn first<T: Topic>(name: &str, topic: &mut Subscriber<T>, over: impl Fn() -> bool) -> Result<T, WatchError> {
     let (clock, mut logged) = (Clock::start(), false);
     while clock.now_ms() < 1e3 * TIMEOUT_S && !over() {
         if let Ok(Some(record)) = topic.newest() {
@@ -124,15 +128,15 @@ fn first<T: Topic>(name: &str, topic: &mut Subscriber<T>, over: impl Fn() -> boo
         }
         std::thread::sleep(POLL_INTERVAL);
     }
-    Err(SessionError::Usage(format!(
+    Err(WatchError(format!(
         "--watch {name}: no session of this name is there: start one on this machine with --share {name}, then watch it"
     )))
 }
 
 impl Watched {
     /// Connects to the session of a name and waits for its first tick; the tool begins at `start`.
-    pub fn open(name: &str, start: ToolState, stop: &Stop) -> Result<(Self, Watching), SessionError> {
-        let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
+    pub fn open(name: &str, start: ToolState, stop: &Stop) -> Result<(Self, Watching), WatchError> {
+        let fault = |fault: TopicError| WatchError(format!("--watch {name}: {fault}"));
         let session = Session::join(name).map_err(fault)?;
         let mut ticks: Subscriber<TickRecord> = session.subscriber().map_err(fault)?;
         let (mut writer, newest) = cell(TickRecord::default());
@@ -191,7 +195,7 @@ impl HapticDevice for Watched {
 
 /// Connections of a session's window to other sessions.
 #[derive(Default)]
-pub(crate) struct PeerSession {
+pub struct PeerSession {
     /// Requests of a teacher to this session's trainee.
     pub asked: Option<Reader<TeacherRecord>>,
     /// Send end, where this session teaches the trainee of another.
@@ -201,12 +205,12 @@ pub(crate) struct PeerSession {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
     use trepan_geometry::Pose;
 
     /// Connects a watcher to a session that sends ticks only until the watcher is connected.
-    pub(crate) fn connected(name: &str) -> (Watched, Watching) {
+    fn connected(name: &str) -> (Watched, Watching) {
         let trainee = Session::join(name).unwrap();
         let mut ticks = trainee.publisher::<TickRecord>().unwrap();
         let connected = AtomicBool::new(false);

@@ -18,7 +18,7 @@ const KEPT: f64 = 0.998;
 
 /// Milliseconds since the session began.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Clock {
+pub struct Clock {
     start: Instant,
 }
 
@@ -44,7 +44,7 @@ impl Clock {
 
 /// A thread's waits, which end when they should.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Waits {
+pub struct Waits {
     /// How late the thread has woken lately, ms.
     late_ms: f64,
 }
@@ -79,7 +79,7 @@ impl Waits {
 
 /// Deadlines at a fixed rate.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Schedule {
+pub struct Schedule {
     period_ms: f64,
     next_ms: f64,
 }

@@ -1,6 +1,5 @@
 //! Every key of `--set` in a short operation without a device: its effect on the hand, and replays.
 
-use super::*;
 use crate::config::SessionConfig;
 use crate::device_limits::DeviceLimits;
 use crate::models::ModelRequest;
@@ -8,15 +7,20 @@ use crate::operation::Operation;
 use crate::options::Options;
 use crate::session_setup::SessionSetup;
 use clap::Parser;
-use trepan_geometry::{Quat, ToolKind, Vec3};
-use trepan_haptics::{Capabilities, DeviceName};
+use trepan_contact::SurfacePatch;
+use trepan_geometry::{Buttons, Pose, Quat, ToolKind, ToolState, Vec3};
+use trepan_haptics::{Capabilities, DeviceName, Reading, Status};
+use trepan_link::Recording;
+use trepan_link::wire::TickRecord;
 use trepan_models::ingredients::{KEYS, SolverDevice};
 use trepan_models::measure::CaseErrors;
 use trepan_patient::import::Facts;
 use trepan_patient::opening::Opening;
 use trepan_patient::{Brain, Case};
+use trepan_runtime::{Stages, lockstep};
 use trepan_soft::boxes;
-use trepan_stages::force_scale::ForceScale;
+use trepan_stages::collision_step::SoftFrame;
+use trepan_stages::haptic_tick::{TickInput, ToolSample};
 use trepan_stages::program::{Phase, Program};
 use trepan_volume::VoxelVolume;
 
@@ -133,12 +137,9 @@ fn operated_cheaper(line: &str, cheaper_from: u64) -> (Recording, SessionSetup) 
 /// Ticks that give the same force when the recording is replayed by its header.
 fn replayed(recording: &Recording) -> (u64, SessionSetup) {
     let setup = setup("", Some(recording));
-    let (senders, _pages) = journal(ForceScale::default());
     let tool = Program::Integrated.tray()[0];
     let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false };
-    let mut replay = Replay::new(stages(&setup), recording, senders, start);
-    recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
-    (replay.replayed.identical, setup)
+    (lockstep::compare(stages(&setup), recording, start).identical, setup)
 }
 
 /// Largest difference on bone and on the brain: of the forces, N, and of the torques, N mm.

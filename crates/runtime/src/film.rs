@@ -20,8 +20,8 @@
 //! at the last shot, and the nodes of some shots, 6 bytes each. Without a scene file a minute of
 //! craniotomy is made again in a second; with the brain, in about the time of the solver.
 
-use crate::run::View;
-use crate::run::stop::Stop;
+use crate::View;
+use crate::stop::Stop;
 use glam::IVec3;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
 use trepan_stages::notice::Notice;
 
 /// Session time between two shots, ms.
-pub(crate) const SHOT_MS: f64 = 1000.0 / 30.0;
+pub const SHOT_MS: f64 = 1000.0 / 30.0;
 /// Largest number of shots that hold the brain's nodes, where the length is known.
 const BRAINS: f64 = 3600.0;
 /// Session time between two shots of a live session that hold the brain's nodes, ms.
@@ -44,7 +44,7 @@ const LOOK: Duration = Duration::from_millis(4);
 const BRICK: usize = 8;
 
 /// One moment of a film.
-pub(crate) struct Shot {
+pub struct Shot {
     /// View of the tick.
     pub view: View,
     /// Voxels of the CT that changed since the last shot.
@@ -57,13 +57,13 @@ pub(crate) struct Shot {
 }
 
 /// Displacements of nodes as a film holds them.
-pub(crate) fn displacements(positions: &[Vec3], rest: &[Vec3]) -> Vec<[i16; 3]> {
+pub fn displacements(positions: &[Vec3], rest: &[Vec3]) -> Vec<[i16; 3]> {
     let steps = |(now, rest): (&Vec3, &Vec3)| ((*now - *rest) / NODE_STEP_MM).round().to_array().map(|mm| mm as i16);
     positions.iter().zip(rest).map(steps).collect()
 }
 
 /// Position of a node that a film holds, mm.
-pub(crate) fn position(rest: Vec3, [x, y, z]: [i16; 3]) -> Vec3 {
+pub fn position(rest: Vec3, [x, y, z]: [i16; 3]) -> Vec3 {
     rest + NODE_STEP_MM * Vec3::new(x.into(), y.into(), z.into())
 }
 
@@ -95,7 +95,7 @@ impl Shot {
 }
 
 /// Takes the shots of a session.
-pub(crate) struct Filming {
+pub struct Filming {
     skull: Option<Carved>,
     rest: Vec<Vec3>,
     next_ms: f64,
@@ -222,7 +222,7 @@ fn places(low: [usize; 3], dims: [usize; 3]) -> impl Iterator<Item = (usize, usi
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
     use trepan_bone::CUT_SURFACE;
     use trepan_geometry::{Pose, ToolState};
@@ -231,7 +231,7 @@ pub(crate) mod tests {
     use trepan_volume::{AIR_HU, VoxelVolume};
 
     /// Returns the view of a tool at the origin.
-    pub(crate) fn view(time_ms: f64) -> View {
+    fn view(time_ms: f64) -> View {
         let tool = Program::Craniotomy.tray()[0];
         let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
         View { time_ms, ..View::at(sample, 1.0) }

@@ -1,21 +1,34 @@
-//! Types that live sessions and replays share: the stages, the inputs of rendering, the outcome.
+//! Runs the stages of a session on threads, or replays them from a recording, bit for bit.
 //!
-//! A session runs live on threads ([`crate::run::threads`]), or as a replay of a recording on one
-//! thread ([`crate::run::lockstep`]).
+//! # Theory
+//! Three loops exchange their newest values without waiting: haptic tick, collision step, solver
+//! step. [`threads`] gives each stage its thread and its clock; [`lockstep`] gives the same stages
+//! what a recording holds, in the recorded order, on one thread.
+//!
+//! # Practice
+//! [`Run`] is what both need, [`Outcome`] what both return. A journal records every tick from a
+//! thread of its own, a [film] what a window needs to play the session in both directions. A
+//! [watcher](watch) is a session whose device is another session's hand; a [teacher](lesson) sends
+//! requests back.
+//!
+//! # When not to use it
+//! To step one stage in your own loop: use `trepan-stages`.
 
-pub(crate) mod clock;
-pub(crate) mod film;
+pub mod clock;
+pub mod film;
 mod journal;
-pub(crate) mod lesson;
-pub(crate) mod lockstep;
-pub(crate) mod stop;
-pub(crate) mod threads;
-pub(crate) mod watch;
+pub mod lesson;
+pub mod lockstep;
+pub mod stop;
+pub mod threads;
+pub mod watch;
 
-use crate::run::film::{Filming, Shot};
-use crate::run::journal::Written;
-use crate::run::stop::Stop;
-use crate::run::watch::Share;
+pub use watch::WatchError;
+
+use crate::film::{Filming, Shot};
+use crate::journal::Written;
+use crate::stop::Stop;
+use crate::watch::Share;
 use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
@@ -36,7 +49,7 @@ use trepan_stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 use trepan_stages::solver_step::{SolverFaults, SolverStage};
 
 /// What a live session and a replay need.
-pub(crate) struct Run<'a> {
+pub struct Run<'a> {
     /// Bodies of the loops.
     pub stages: Stages,
     /// The tool before the first tick.
@@ -71,7 +84,7 @@ pub struct Tissue {
 
 /// State of the session as it is rendered.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
+pub struct View {
     /// Tool and phase.
     pub sample: ToolSample,
     /// Session time, ms.
@@ -157,7 +170,7 @@ impl View {
 }
 
 /// Read ends for rendering.
-pub(crate) struct RenderInputs {
+pub struct RenderInputs {
     /// Newest tick.
     pub view: Reader<View>,
     /// Newest state of the brain, where it deforms.
@@ -167,10 +180,10 @@ pub(crate) struct RenderInputs {
 }
 
 /// A collision result with its sequence number.
-pub(crate) type Numbered<T> = (u64, T);
+pub type Numbered<T> = (u64, T);
 
 /// Write and read ends of every cell between the loops.
-pub(crate) struct Cells {
+pub struct Cells {
     /// Haptic loop to collision loop.
     pub tool: (Writer<ToolSample>, Reader<ToolSample>),
     /// Haptic loop to rendering.
@@ -275,7 +288,7 @@ impl From<&Times> for Quantiles {
 
 /// Counts and times of the haptic loop.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Ticks {
+pub struct Ticks {
     /// Ticks run.
     pub count: u64,
     /// Ticks that missed their deadline.
@@ -353,7 +366,7 @@ pub struct SolverOutcome {
 
 impl SolverOutcome {
     /// Returns the part of the outcome that a solver stage knows itself.
-    pub(crate) fn of(stage: &SolverStage) -> Self {
+    pub fn of(stage: &SolverStage) -> Self {
         Self {
             dt_ms: stage.mean_dt_ms(),
             max_displacement_mm: stage.max_displacement_mm(),
@@ -397,7 +410,7 @@ impl Replayed {
 
 /// Outcome of a live session or a replay.
 #[derive(Debug, Default)]
-pub(crate) struct Outcome {
+pub struct Outcome {
     /// Counts and times of the haptic loop.
     pub ticks: Ticks,
     /// Length of the run, s of session time.
@@ -426,7 +439,7 @@ pub(crate) struct Outcome {
 
 impl Outcome {
     /// Returns the part of the outcome that the stages know themselves.
-    pub(crate) fn of(stage: &HapticStage, second: Option<&SecondHand>) -> Self {
+    pub fn of(stage: &HapticStage, second: Option<&SecondHand>) -> Self {
         Self {
             scores: *stage.scores(),
             guard: stage.guard().counters(),
@@ -437,3 +450,7 @@ impl Outcome {
         }
     }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -17,12 +17,10 @@
 //! the largest difference. Steps of another length are matched by simulated time. The replay runs
 //! as fast as it can; for a window with a time bar it also makes a film (`run/film.rs`).
 
-use crate::run::clock::Clock;
-use crate::run::film::{Filming, Shot};
-use crate::run::journal::{Journal, JournalSenders, journal};
-use crate::run::{
-    Cells, Numbered, Outcome, RenderInputs, Replayed, Run, SolverOutcome, Stages, Ticks, Times, Tissue, View,
-};
+use crate::clock::Clock;
+use crate::film::{Filming, Shot};
+use crate::journal::{Journal, JournalSenders, journal};
+use crate::{Cells, Numbered, Outcome, RenderInputs, Replayed, Run, SolverOutcome, Stages, Ticks, Times, Tissue, View};
 use std::collections::VecDeque;
 use std::sync::mpsc::channel;
 use std::thread;
@@ -40,7 +38,7 @@ use trepan_stages::second_hand::{SecondHand, SecondView};
 const MEMORY: usize = 16_384;
 
 /// Returns the ticks up to a time, ms, and those right after it in which the force faded out.
-pub(crate) fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
+pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
     let ticks = &recording.ticks;
     let until = ticks.iter().position(|tick| tick.time_ms >= end_ms).map_or(ticks.len(), |at| at + 1);
     let fading = ticks[until..].iter().take_while(|tick| tick.has(TickRecord::RELEASED)).count();
@@ -49,7 +47,7 @@ pub(crate) fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
 
 /// Replays a recording up to a time, ms. Requests a stop at the end, unless a film is made: its
 /// window stays open.
-pub(crate) fn run(
+pub fn run(
     run: Run<'_>,
     (recording, end_ms): (&Recording, f64),
     film: Option<Filming>,
@@ -94,6 +92,15 @@ pub(crate) fn run(
         let outcome = replaying.join().unwrap_or_default();
         Outcome { written: writing.join().unwrap_or_default(), ..outcome }
     })
+}
+
+/// Replays every tick of a recording, without a journal or a picture, and compares the forces.
+pub fn compare(stages: Stages, recording: &Recording, start: ToolSample) -> Replayed {
+    let (senders, _receivers) = journal(stages.haptic.force_scale());
+    let mut replay = Replay::new(stages, recording, senders, start);
+    let clock = Clock::start();
+    recording.ticks.iter().for_each(|record| _ = replay.tick(record, &clock));
+    replay.replayed
 }
 
 /// State of a replay.
@@ -327,9 +334,6 @@ fn remember<T>(memory: &mut VecDeque<T>, item: T) {
     }
     memory.push_back(item);
 }
-
-#[cfg(test)]
-mod ingredients;
 
 #[cfg(test)]
 mod tests {

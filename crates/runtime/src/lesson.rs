@@ -26,17 +26,17 @@ use trepan_link::wire::TeacherRecord;
 
 /// Time without a record after which all of the teacher's requests end, ms. A slow picture of a
 /// busy watcher takes less, so that a pause holds until it is taken back.
-pub(crate) const GONE_MS: f64 = 6000.0;
+pub const GONE_MS: f64 = 6000.0;
 
 /// Bit of each request, and the text that the trainee reads.
-pub(crate) const TEACHER_REQUESTS: [(u32, &str); 3] = [
+pub const TEACHER_REQUESTS: [(u32, &str); 3] = [
     (TeacherRecord::PAUSE, "the teacher pauses the operation"),
     (TeacherRecord::NO_POWER, "the drill has no power"),
     (TeacherRecord::BLEEDING, "the patient bleeds from the bone's edge"),
 ];
 
 /// Receive end, for the recording thread.
-pub(crate) struct Listener {
+pub struct Listener {
     teacher: Subscriber<TeacherRecord>,
     newest: TeacherRecord,
     received_ms: f64,
@@ -77,7 +77,7 @@ impl Listener {
 }
 
 /// A device whose buttons are changed by the teacher's requests.
-pub(crate) struct TeacherButtons {
+pub struct TeacherButtons {
     device: Box<dyn HapticDevice>,
     teacher: Reader<TeacherRecord>,
 }
@@ -122,7 +122,7 @@ impl HapticDevice for TeacherButtons {
 }
 
 /// Send end, for the window of a watching session.
-pub(crate) struct Teacher {
+pub struct Teacher {
     trainee: Publisher<TeacherRecord>,
     record: TeacherRecord,
     _session: Session,

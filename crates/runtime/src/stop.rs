@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Stop flag that all threads share; set once, never cleared.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Stop {
+pub struct Stop {
     requested: Arc<AtomicBool>,
     signal: Arc<AtomicUsize>,
 }

@@ -13,10 +13,10 @@
 //! loop. Real-time priority is requested from the operating system; a refusal becomes a remark. The
 //! force is set to zero and the device closed in every case, also when a loop panics.
 
-use crate::run::clock::{Clock, Schedule, Waits};
-use crate::run::journal::{Journal, JournalSenders, journal};
-use crate::run::stop::Stop;
-use crate::run::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
+use crate::clock::{Clock, Schedule, Waits};
+use crate::journal::{Journal, JournalSenders, journal};
+use crate::stop::Stop;
+use crate::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_contact::{GuardedWrench, SurfacePatch};
@@ -147,7 +147,7 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
 
 /// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
 /// on the calling thread.
-pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
+pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
     let Run { stages, start, recorder, share, scene, stop } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
@@ -191,7 +191,7 @@ pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOn
 
 /// Periods of the loops and end of the session.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Pace {
+pub struct Pace {
     /// Length of a haptic tick, ms.
     pub tick_ms: f32,
     /// Length of a collision step, ms.
@@ -201,7 +201,7 @@ pub(crate) struct Pace {
 }
 
 /// Devices of the hands.
-pub(crate) struct Devices {
+pub struct Devices {
     /// Device of the drill; the operation ends when it is finished.
     pub first: Box<dyn HapticDevice>,
     /// Device of the aspirator, for stages with a second hand.
@@ -209,7 +209,7 @@ pub(crate) struct Devices {
 }
 
 /// Owns the device; on drop it sets the force to zero, closes the device and ends the session.
-pub(crate) struct HapticDeviceOwner {
+pub struct HapticDeviceOwner {
     /// The device.
     pub device: Box<dyn HapticDevice>,
     /// Stop flag that is set on drop.
@@ -303,7 +303,7 @@ struct SolverEnds {
 }
 
 /// Requests a first-in-first-out priority for this thread; returns a remark when it is refused.
-pub(crate) fn real_time(priority: u8, name: &str) -> Option<String> {
+pub fn real_time(priority: u8, name: &str) -> Option<String> {
     let value = priority.try_into().ok().map(ThreadPriority::Crossplatform)?;
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let set = thread_priority::set_thread_priority_and_policy(thread_priority::thread_native_id(), value, policy);
