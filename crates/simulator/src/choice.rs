@@ -223,7 +223,7 @@ mod tests {
     use clap::Parser;
     use std::collections::BTreeMap;
     use trepan_models::measure::CaseErrors;
-    use trepan_models::measure::in_case::{SHIPPED, before_building, shipped};
+    use trepan_models::measure::in_case::{ERRORS, SHIPPED, before_building, shipped};
     use trepan_patient::TissueSource;
 
     /// With `TREPAN_KEEP_MEASURED` the errors are measured, and kept in the file that is shipped.
@@ -253,13 +253,13 @@ mod tests {
                     &facts,
                     || card,
                     |scene, rows, element| {
-                        let key = cache.under(&import.key, &CaseErrors::about(scene, rows, element));
-                        let errors = if keeps {
-                            before_building(&mut import, scene, rows, element)?
-                        } else {
-                            shipped(&key).unwrap_or_default()
-                        };
-                        all.insert(key, errors.clone());
+                        let errors = before_building(&mut import, scene, rows, element)?;
+                        let about = CaseErrors::about(program.has_bone(), scene, rows, element);
+                        for about in [about.bone, about.tissue, about.picture].into_iter().flatten() {
+                            let key = cache.under(&import.key, &about);
+                            let measured = || cache.read(&key, ERRORS).expect("it was measured");
+                            all.insert(key.clone(), shipped(&key).unwrap_or_else(measured));
+                        }
                         Ok(errors)
                     },
                 );

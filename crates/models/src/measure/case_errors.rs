@@ -41,7 +41,7 @@ use trepan_patient::Fineness;
 use trepan_rigid::Method;
 
 /// Version of the measurement; raised when the errors change for the same case and choices.
-const FORM: u32 = 19;
+const FORM: u32 = 20;
 /// Slides along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of a slide, mm.
@@ -65,6 +65,14 @@ pub struct Sight {
     pub eye: Vec3,
     /// The brain and the exposed point of its surface, if any.
     pub brain: Option<(Shape, Vec3)>,
+}
+
+/// A part whose errors are measured and cached by itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part {
+    Bone,
+    Tissue,
+    Picture,
 }
 
 /// Measured errors of choices, by their names in the table.
@@ -108,13 +116,38 @@ impl CaseErrors {
         }
     }
 
-    /// Lists all inputs of the measurement except the case, for a cache key.
-    pub fn about(scene: &Scene, rows: &Rows, element: Element) -> String {
+    /// Lists all inputs of the measurement of each part except the case, for cache keys; `None`
+    /// for a part that is not measured. `on_skull`: whether the opening is one of a skull.
+    pub fn about(on_skull: bool, scene: &Scene, rows: &Rows, element: Element) -> Parts<Option<String>> {
         let Scene { tool_radius_mm, press_mm, tissue_motion_mm, probe_radius_mm, view_mm, .. } = *scene;
-        let lengths = [tool_radius_mm, press_mm, tissue_motion_mm, probe_radius_mm, view_mm];
-        let has = (scene.has_bone, scene.has_tissue, scene.material, scene.picture_pixels);
-        let names = (names(&rows.bone), names(&rows.tissue), names(&rows.picture));
-        format!("own {FORM} {element:?} {lengths:?} {has:?} {names:?}")
+        let text = |lengths: &[f64], names: Vec<Vec<String>>| {
+            (!names.is_empty()).then(|| format!("own {FORM} {on_skull} {lengths:?} {names:?}"))
+        };
+        let bone = text(&[tool_radius_mm, press_mm], names(&rows.bone));
+        let tissue = text(&[press_mm, tissue_motion_mm, probe_radius_mm], names(&rows.tissue));
+        Parts {
+            bone: bone.filter(|_| scene.has_bone),
+            tissue: tissue.filter(|_| scene.has_tissue).map(|text| format!("{text} {element:?} {:?}", scene.material)),
+            picture: text(&[view_mm], names(&rows.picture)).map(|text| format!("{text} {:?}", scene.picture_pixels)),
+        }
+    }
+
+    /// The errors of one part alone.
+    pub(super) fn only(&self, part: Part) -> Self {
+        let Self { bone, tissue, tissue_force, picture } = self.clone();
+        match part {
+            Part::Bone => Self { bone, ..Self::default() },
+            Part::Tissue => Self { tissue, tissue_force, ..Self::default() },
+            Part::Picture => Self { picture, ..Self::default() },
+        }
+    }
+
+    /// Adds the errors of other parts.
+    pub(super) fn add(&mut self, other: Self) {
+        self.bone.extend(other.bone);
+        self.tissue.extend(other.tissue);
+        self.tissue_force.extend(other.tissue_force);
+        self.picture.extend(other.picture);
     }
 
     /// Replaces the power laws of a scene's errors by the measured errors, for measured parts.
