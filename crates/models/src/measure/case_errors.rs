@@ -267,9 +267,9 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows, element: Element) -> Vec
     let slide = Slide { scene, place: *place, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
     let found = || {
         let brains = Brains::of(shape, &choices, element)?;
-        let push = Push::of(&slide, &brains, Fineness::QUICK)?;
+        let (push, found) = Push::measured(&slide, &brains, Fineness::QUICK)?;
         // Where the brain is fixed, the error of every mesh would be zero.
-        if push.moved_mm() < LEAST_MM { Ok(Vec::new()) } else { push.measure(&brains) }
+        Ok(if push.moved_mm() < LEAST_MM { Vec::new() } else { found })
     };
     let found = found().unwrap_or_else(|fault: ModelError| {
         tracing::warn!("{fault}");

@@ -186,11 +186,54 @@ fn brain_error(fault: impl std::fmt::Display) -> ModelError {
 
 /// A push of the tool, with the ground truth of what the hand feels and the eye sees.
 pub struct Push {
+    course: Course,
+    truth: Pushed,
+}
+
+/// The way of the tool over the brain.
+#[derive(Clone, Copy)]
+struct Course {
     slide: Slide,
     normal: Vec3,
     /// Ends of the slide on the mask's surface.
     ends: [Vec3; 2],
-    truth: Pushed,
+}
+
+impl Course {
+    fn of(slide: &Slide, shape: &Shape) -> Self {
+        let around = |n: usize| {
+            let turn = core::f32::consts::TAU * n as f32 / 12.0;
+            let (a, b) = slide.outward.any_orthonormal_pair();
+            shape.field.gradient(slide.place + 4.0 * (turn.cos() * a + turn.sin() * b))
+        };
+        let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
+        let on_surface = |p: Vec3| (0..4).fold(p, |p, _| p - shape.field.sample(p) * normal);
+        let ends = [0.0, slide.length_mm].map(|mm| on_surface(slide.place + mm * slide.along(normal)));
+        Self { slide: *slide, normal, ends }
+    }
+
+    fn truth(self, brains: &Brains, fineness: Fineness) -> Result<Push, ModelError> {
+        let middle = 0.5 * (self.ends[0] + self.ends[1]);
+        let mesh = refined(&brains.domain, fineness, middle, self.normal)?;
+        let truth = run(self, &mesh, &mut brains.tled(&mesh, true, false)?, LONGEST_MS[0])?;
+        Ok(Push { course: self, truth })
+    }
+
+    /// Runs every choice, in the order of `brains`; each with the cost of a step.
+    fn runs(self, brains: &Brains) -> Result<Vec<(f64, Pushed)>, ModelError> {
+        let one = |choice: &Tissue| {
+            let (tets, halvings) = (choice.tets, choice.halvings);
+            let refined = (halvings > 0)
+                .then(|| refined(&brains.domain, Fineness::stepped(tets, halvings), self.ends[0], self.normal));
+            let refined = refined.transpose()?;
+            let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
+            let mesh = refined.as_ref().or_else(alike).ok_or_else(|| brain_error("a mesh is missing"))?;
+            let longest_ms = LONGEST_MS[usize::from(choice.solver == "corotational")];
+            let (mut solver, cost) = brains.solver(choice, mesh)?;
+            Ok((cost, run(self, mesh, &mut *solver, longest_ms)?))
+        };
+        brains.choices.iter().map(one).collect()
+    }
 }
 
 /// What a push did to the tissue.
@@ -213,20 +256,19 @@ impl Push {
     /// # Errors
     /// If the mask cannot be meshed.
     pub fn of(slide: &Slide, brains: &Brains, truth: Fineness) -> Result<Self, ModelError> {
-        let shape = brains.shape;
-        let around = |n: usize| {
-            let turn = core::f32::consts::TAU * n as f32 / 12.0;
-            let (a, b) = slide.outward.any_orthonormal_pair();
-            shape.field.gradient(slide.place + 4.0 * (turn.cos() * a + turn.sin() * b))
-        };
-        let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
-        let on_surface = |p: Vec3| (0..4).fold(p, |p, _| p - shape.field.sample(p) * normal);
-        let ends = [0.0, slide.length_mm].map(|mm| on_surface(slide.place + mm * slide.along(normal)));
-        let middle = 0.5 * (ends[0] + ends[1]);
-        let mesh = refined(&brains.domain, truth, middle, normal)?;
-        let solver = &mut brains.tled(&mesh, true, false)?;
-        let truth = run(slide, normal, ends, &mesh, solver, LONGEST_MS[0])?;
-        Ok(Self { slide: *slide, normal, ends, truth })
+        Course::of(slide, brains.shape).truth(brains, truth)
+    }
+
+    /// Computes the ground truth and measures every choice beside it, on two threads.
+    ///
+    /// # Errors
+    /// If the mask cannot be meshed, or a solver refuses the mesh.
+    pub fn measured(slide: &Slide, brains: &Brains, truth: Fineness) -> Result<(Self, Vec<Measurement>), ModelError> {
+        let course = Course::of(slide, brains.shape);
+        let (push, runs) = rayon::join(|| course.truth(brains, truth), || course.runs(brains));
+        let push = push?;
+        let found = runs?.into_iter().map(|(cost, run)| push.found(cost, &run)).collect();
+        Ok((push, found))
     }
 
     /// Measures TLED on a mesh refined at the opening, with or without averaged nodal pressure.
@@ -239,10 +281,10 @@ impl Push {
         fineness: Fineness,
         averaged_pressure: bool,
     ) -> Result<Measurement, ModelError> {
-        let mesh = refined(&brains.domain, fineness, self.ends[0], self.normal)?;
+        let mesh = refined(&brains.domain, fineness, self.course.ends[0], self.course.normal)?;
         let mut tled = brains.tled(&mesh, averaged_pressure, true)?;
-        let cost = tled.averaged_cost();
-        self.found(&mesh, (&mut tled, cost), LONGEST_MS[0])
+        let run = run(self.course, &mesh, &mut tled, LONGEST_MS[0])?;
+        Ok(self.found(tled.averaged_cost(), &run))
     }
 
     /// Measures every choice, in the order of `brains`.
@@ -250,29 +292,12 @@ impl Push {
     /// # Errors
     /// If a solver refuses the mesh.
     pub fn measure(&self, brains: &Brains) -> Result<Vec<Measurement>, ModelError> {
-        let one = |choice: &Tissue| {
-            let (tets, halvings) = (choice.tets, choice.halvings);
-            let refined = (halvings > 0)
-                .then(|| refined(&brains.domain, Fineness::stepped(tets, halvings), self.ends[0], self.normal));
-            let refined = refined.transpose()?;
-            let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
-            let mesh = refined.as_ref().or_else(alike).ok_or_else(|| brain_error("a mesh is missing"))?;
-            let longest_ms = LONGEST_MS[usize::from(choice.solver == "corotational")];
-            let (mut solver, cost) = brains.solver(choice, mesh)?;
-            self.found(mesh, (&mut *solver, cost), longest_ms)
-        };
-        brains.choices.iter().map(one).collect()
+        Ok(self.course.runs(brains)?.iter().map(|(cost, run)| self.found(*cost, run)).collect())
     }
 
-    fn found(
-        &self,
-        mesh: &TetMesh,
-        (solver, cost): (&mut dyn SoftSolver, f64),
-        longest_ms: f32,
-    ) -> Result<Measurement, ModelError> {
-        let found = run(&self.slide, self.normal, self.ends, mesh, solver, longest_ms)?;
+    fn found(&self, cost: f64, found: &Pushed) -> Measurement {
         let (step_cost, dt_ms, ns) = (cost * found.substeps, found.dt_ms, found.ns);
-        Ok(Measurement { error_mm: self.error_mm(&found), force: self.force(&found), step_cost, dt_ms, ns })
+        Measurement { error_mm: self.error_mm(found), force: self.force(found), step_cost, dt_ms, ns }
     }
 
     /// Distance of this ground truth from a finer one, 95th percentile over the places, mm.
@@ -293,7 +318,7 @@ impl Push {
     /// Places over the surface around the tool at an end of the slide: the hole that one sees
     /// through.
     fn seen(&self, end: usize) -> impl Iterator<Item = Vec3> {
-        disc(LOOK.0, LOOK.1, self.normal).map(move |aside| self.ends[end] + aside)
+        disc(LOOK.0, LOOK.1, self.course.normal).map(move |aside| self.course.ends[end] + aside)
     }
 
     fn error_mm(&self, found: &Pushed) -> f64 {
@@ -320,14 +345,12 @@ fn refined(domain: &lattice::Domain, fineness: Fineness, place: Vec3, normal: Ve
 
 /// Runs push and slide.
 fn run(
-    slide: &Slide,
-    normal: Vec3,
-    ends: [Vec3; 2],
+    Course { slide, normal, ends }: Course,
     mesh: &TetMesh,
     solver: &mut dyn SoftSolver,
     longest_ms: f32,
 ) -> Result<Pushed, ModelError> {
-    let ball = Ball { slide, normal, ends };
+    let ball = Ball { slide: &slide, normal, ends };
     let mut contact = BallContact::new(mesh, ball.at(0.0).radius_mm)?;
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
     let (mut surfaces, mut forces_n) = (vec![Surroundings::of(mesh, ends[0])?], [0.0; 2]);
