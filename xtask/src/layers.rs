@@ -11,13 +11,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates by floor, lowest first.
-const FLOORS: [&[&str]; 11] = [
+const FLOORS: [&[&str]; 12] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget", "window", "evidence", "stages"],
     &["patient", "runtime"],
     &["models"],
+    &["report"],
     &["simulator"],
     &["craniotomy", "brain", "integrated", "trials-scenes"],
     &["trials-bone", "trials-tissue"],
@@ -89,7 +90,7 @@ fn short(package: &str) -> &str {
 /// The crates of trials, and those that a session consists of, are kept to the same as one.
 fn group(name: &str) -> &str {
     match name {
-        "patient" | "models" | "runtime" => "simulator",
+        "patient" | "models" | "report" | "runtime" => "simulator",
         _ if name.starts_with("trials-") => "trials",
         _ => name,
     }

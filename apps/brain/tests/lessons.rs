@@ -7,8 +7,8 @@ mod passing;
 #[test]
 fn a_script_passes_every_lesson() {
     let lessons = [
-        ("script:press", ("press", include_str!("../../../crates/simulator/lessons/4-press.json"))),
-        ("script:retract", ("retract", include_str!("../../../crates/simulator/lessons/5-retract.json"))),
+        ("script:press", ("press", include_str!("../../../crates/report/lessons/4-press.json"))),
+        ("script:retract", ("retract", include_str!("../../../crates/report/lessons/5-retract.json"))),
     ];
     passing::all_pass(env!("CARGO_BIN_EXE_brain"), &lessons);
 }

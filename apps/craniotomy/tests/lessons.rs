@@ -8,10 +8,10 @@ fn a_script_passes_every_lesson() {
     let lessons = [
         (
             "script:craniotomy",
-            ("first-operation", include_str!("../../../crates/simulator/lessons/1-first-operation.json")),
+            ("first-operation", include_str!("../../../crates/report/lessons/1-first-operation.json")),
         ),
-        ("script:craniotomy", ("through", include_str!("../../../crates/simulator/lessons/2-straight-through.json"))),
-        ("script:flap", ("flap", include_str!("../../../crates/simulator/lessons/3-flap.json"))),
+        ("script:craniotomy", ("through", include_str!("../../../crates/report/lessons/2-straight-through.json"))),
+        ("script:flap", ("flap", include_str!("../../../crates/report/lessons/3-flap.json"))),
     ];
     passing::all_pass(env!("CARGO_BIN_EXE_craniotomy"), &lessons);
 }

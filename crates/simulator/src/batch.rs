@@ -7,13 +7,13 @@
 //! independent; `cargo xtask merge` merges their summaries into one table.
 
 use crate::error::SessionError;
-use crate::printable::printable;
-use crate::report::output::dated;
 use crate::session::{Place, Session, SessionResult};
 use crate::{Inputs, Options, Program};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use trepan_haptics::DeviceName;
+use trepan_report::output::dated;
+use trepan_report::printable::printable;
 
 /// Lists the recordings of this shard in the order of their names. `None` if `--device` is not a
 /// folder of recordings.

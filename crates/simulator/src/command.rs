@@ -4,24 +4,24 @@
 use crate::batch;
 use crate::choice::{BuiltCase, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
-use crate::constants;
 use crate::desk::{self, Done};
-use crate::device_test;
 use crate::inspect::inspect;
 use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, SessionsTask, Task, rate};
-use crate::printable::{columns, count, printable};
 use crate::recordings;
-use crate::report::summary::{CutOff, behind, slow};
-use crate::report::{film, sessions, ticks};
 use crate::session::{Place, Session, SessionResult};
 use crate::show::driver;
 use crate::{Inputs, Options, Program, SessionError};
+use crate::{sessions, ticks};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 use trepan_models::ingredients::table;
+use trepan_report::constants;
+use trepan_report::printable::{columns, count, printable};
+use trepan_report::summary::{CutOff, behind, slow};
+use trepan_report::{device_test, film};
 use trepan_runtime::Quantiles;
 use trepan_volume::dicom::Series;
 use trepan_window::display;
@@ -131,11 +131,13 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
         }),
         Task::Recording(RecordingTask::Check { file }) => recordings::check(program, file),
         Task::Recording(RecordingTask::Repair { file, out }) => recordings::repair_file(file, out),
-        Task::Recording(RecordingTask::Film { folder, out }) => film::make(folder, out),
+        Task::Recording(RecordingTask::Film { folder, out }) => film::make(folder, out).map_err(SessionError::from),
         Task::Recording(RecordingTask::Export { file, csv, every_ms }) => ticks::export(file, csv, *every_ms),
         Task::Sessions(SessionsTask::List(wanted)) => sessions::list(wanted),
         Task::Sessions(SessionsTask::Export { csv, wanted }) => sessions::export(wanted, csv),
-        Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),
+        Task::Device(DeviceTask::Test { name, out, duration }) => {
+            device_test::run(name, out, *duration).map(ended_by).map_err(SessionError::from)
+        }
     };
     done.unwrap_or_else(|fault| failed(program, &fault))
 }

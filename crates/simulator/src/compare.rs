@@ -11,9 +11,6 @@
 
 use crate::config::SessionConfig;
 use crate::error::SessionError;
-use crate::report::chart::{Chart, Curve, over_time};
-use crate::report::page::{Event, render};
-use crate::whole::whole;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs;
@@ -21,6 +18,9 @@ use std::path::{Path, PathBuf};
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, TickRecord};
 use trepan_patient::identity::Identity;
+use trepan_report::chart::{Chart, Curve, over_time};
+use trepan_report::page::{Event, render};
+use trepan_report::whole::whole;
 use trepan_stages::score::ScoreKeeper;
 
 /// Reads two recordings and writes `compare.html` to a folder.
@@ -29,7 +29,8 @@ pub(crate) fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionE
     let page = page(&[Recording::open(first)?, Recording::open(second)?])?;
     fs::create_dir_all(out).map_err(SessionError::output(out))?;
     let path = out.join("compare.html");
-    whole(&path, page.as_bytes()).map(|()| path)
+    whole(&path, page.as_bytes())?;
+    Ok(path)
 }
 
 /// Names of the two sessions.
@@ -43,7 +44,7 @@ fn page(sessions: &[Recording; 2]) -> Result<String, SessionError> {
         "sessions": ([0, 1].map(|at| json!({ "name": NAMES[at], "events": events(&sessions[at]) }))),
         "curves": curves(sessions)?,
     });
-    render("compare.html", &context)
+    Ok(render("compare.html", &context)?)
 }
 
 /// Remarks on differences that limit the comparison.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use trepan_models::ModelError;
 use trepan_patient::PatientError;
+use trepan_report::ReportError;
 use trepan_runtime::WatchError;
 
 /// Error that keeps a session from starting or from writing its files. Errors that the user can
@@ -58,6 +59,16 @@ impl SessionError {
             Self::Picture(_) | Self::Internal(_) | Self::Patient(PatientError::Internal(_)) => 1,
             Self::Model(fault) if fault.is_internal() => 1,
             _ => 2,
+        }
+    }
+}
+
+impl From<ReportError> for SessionError {
+    fn from(fault: ReportError) -> Self {
+        match fault {
+            ReportError::Usage(text) => Self::Usage(text),
+            ReportError::Output { path, fault } => Self::Output { path, fault },
+            ReportError::Internal(text) => Self::Internal(text),
         }
     }
 }

@@ -5,12 +5,12 @@
 //! is written. No element that could identify a patient is read.
 
 use crate::error::SessionError;
-use crate::printable::printable;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::Recording;
 use trepan_mesh::{Quality, SURFACE_FORMATS, Surface, Topology, VOLUME_FORMATS};
+use trepan_report::printable::printable;
 use trepan_volume::{Import, VoxelVolume, dicom};
 
 /// First bytes of a recording.

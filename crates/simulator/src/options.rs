@@ -1,6 +1,5 @@
 //! The command line that the three programs share.
 
-use crate::constants;
 use crate::error::SessionError;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::convert::Infallible;
@@ -9,6 +8,7 @@ use std::path::PathBuf;
 use trepan_budget::Quality;
 use trepan_models::ingredients::{KeyValue, setting};
 use trepan_patient::{TissueClass, TissueSource};
+use trepan_report::constants;
 use trepan_stages::force_scale::ForceScale;
 use trepan_stages::program::Program;
 

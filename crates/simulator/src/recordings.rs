@@ -3,12 +3,12 @@
 
 use crate::config::SessionConfig;
 use crate::error::SessionError;
-use crate::printable::printable;
 use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recording, repair};
 use trepan_patient::identity::Identity;
+use trepan_report::printable::printable;
 use trepan_stages::program::Program;
 
 /// Describes what a recording lacks, with the remedy if there is one; `None` if it is complete.

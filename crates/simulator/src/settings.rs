@@ -6,12 +6,12 @@
 //! a recent case is opened from them again; they are never shown.
 
 use crate::error::SessionError;
-use crate::whole::whole;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
+use trepan_report::whole::whole;
 
 /// Largest number of recent cases.
 const MOST_RECENT: usize = 12;
@@ -118,7 +118,7 @@ impl Settings {
         let file = file().ok_or_else(no_folder)?;
         let json = serde_json::to_vec_pretty(self).map_err(|fault| SessionError::Internal(fault.to_string()))?;
         file.parent().map_or(Ok(()), fs::create_dir_all).map_err(SessionError::output(&file))?;
-        whole(&file, &json)
+        Ok(whole(&file, &json)?)
     }
 
     /// Puts a case on top of the recent ones, in place of an entry of the same source.

@@ -5,10 +5,10 @@
 //! program's lie in `languages/`, a user's in the folder `languages` beside the settings, where a
 //! file of the same name replaces the program's.
 
-use crate::training::Lesson;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
+use trepan_report::training::Lesson;
 use trepan_window::{Choosable, Language};
 
 /// Short name and file of each language of the program.

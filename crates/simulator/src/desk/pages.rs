@@ -4,12 +4,12 @@ use crate::desk::action::Action;
 use crate::desk::browse::{Folder, Goal};
 use crate::desk::form::Form;
 use crate::error::SessionError;
-use crate::printable::{capital, printable};
 use crate::settings::{Images, Recent, Source};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_render::Image;
+use trepan_report::printable::{capital, printable};
 use trepan_stages::program::Program;
 use trepan_window::{Amount, Choosable, Item, Page, Picture};
 

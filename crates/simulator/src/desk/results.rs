@@ -1,13 +1,13 @@
 //! The result page of a session, the list of all sessions and the list of lessons.
 
 use crate::desk::action::Action;
-use crate::printable::{count, printable};
-use crate::report::debrief::{Debrief, Row};
-use crate::report::kept::SessionFolder;
-use crate::report::sessions::{self, SessionRow};
+use crate::sessions::{self, SessionRow};
 use crate::settings::Recent;
-use crate::training::Lesson;
 use std::path::{Path, PathBuf};
+use trepan_report::debrief::{Debrief, Row};
+use trepan_report::kept::SessionFolder;
+use trepan_report::printable::{count, printable};
+use trepan_report::training::Lesson;
 use trepan_window::{Item, Page};
 
 /// The page of a session's result.

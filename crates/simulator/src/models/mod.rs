@@ -19,13 +19,10 @@
 mod describe;
 mod overrides;
 
-pub use describe::{ModelSummary, TissueSummary};
-
 use crate::config::SessionConfig;
 use crate::error::SessionError;
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
-use crate::uncertainty;
 use overrides::{Overrides, written};
 use trepan_budget::{Bone, Choice, Machine, Plan, Quality, Row, Rows, Scene, Setup, TissueForce};
 use trepan_geometry::{ToolKind, units};
@@ -35,6 +32,7 @@ use trepan_models::measure::{self, CaseErrors, Parts, PlannedParts};
 use trepan_patient::Recipe;
 use trepan_patient::TissueClass;
 use trepan_patient::import::Facts;
+use trepan_report::uncertainty;
 use trepan_soft::Material;
 use trepan_stages::haptic_config::BONE_STIFFNESS;
 use trepan_stages::program::Program;

@@ -5,7 +5,6 @@
 //! the time of a fault, the tool's pose is. Each picture takes up to a second on a processor.
 
 use crate::error::SessionError;
-use crate::report::page::Shot;
 use crate::session_setup::SessionSetup;
 use crate::show::picture::{microscope, snap};
 use std::path::Path;
@@ -13,6 +12,7 @@ use trepan_geometry::Vec3;
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, TickRecord};
 use trepan_render::{Camera, Frame, Painter, SliceLook};
+use trepan_report::page::Shot;
 
 /// Field of view, which shows 35 mm from 250 mm, rad.
 const CLOSE_RAD: f32 = 0.14;

@@ -13,13 +13,13 @@
 //! Okabe and Ito (2008), distinct for all kinds of colour vision. An overlay is a box of some
 //! 10⁵ texels, made once in tens of milliseconds.
 
-use crate::report::regions::touched;
 use glam::IVec3;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Tool, Vec3};
 use trepan_link::wire::TickRecord;
 use trepan_patient::Plan;
 use trepan_render::Paint;
+use trepan_report::regions::touched;
 use trepan_volume::DistanceField;
 
 const SKY: [f32; 3] = [86.0, 180.0, 233.0];

@@ -1,7 +1,6 @@
 //! The painter of a session's pictures, and the coloured maps at its end.
 
 use crate::SessionError;
-use crate::report::page::Shot;
 use crate::session_setup::SessionSetup;
 use crate::show::colours::{self, Colours};
 use crate::show::picture::snap;
@@ -10,6 +9,7 @@ use trepan_budget::Picture;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_link::Recording;
 use trepan_render::{Camera, Frame, Painter, RenderError, SceneData, SliceLook};
+use trepan_report::page::Shot;
 
 /// Caption of the map of bone.
 const OF_BONE: &str = "bone against the plan: green as planned, blue planned and left, red taken outside the plan";

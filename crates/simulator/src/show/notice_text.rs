@@ -1,8 +1,8 @@
 //! Texts of the window's panel, live and in a replay: phase, tool, forces, warnings.
 
-use crate::printable::capital;
-use crate::uncertainty::Band;
 use trepan_geometry::{Buttons, Tool};
+use trepan_report::printable::capital;
+use trepan_report::uncertainty::Band;
 use trepan_runtime::View;
 use trepan_stages::notice::{Notice, Warning};
 use trepan_stages::program::{Phase, Program, called};

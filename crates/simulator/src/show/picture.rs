@@ -2,8 +2,6 @@
 //! the window.
 
 use crate::SessionError;
-use crate::report::page::Shot;
-use crate::report::summary::MovingSummary;
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use std::path::{Path, PathBuf};
@@ -12,6 +10,8 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_patient::opening::eye;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_report::page::Shot;
+use trepan_report::summary::MovingSummary;
 use trepan_runtime::clock::Clock;
 use trepan_runtime::stop::Stop;
 use trepan_runtime::{RenderInputs, Times, View};

@@ -7,7 +7,6 @@
 //! in between, some 20 ns each, at most [`MAX_VOXELS`] per picture: a longer jump takes more.
 //! The brain's nodes are interpolated between the shots that hold them.
 
-use crate::printable::capital;
 use crate::show::notice_text::NEWS_MS;
 use crate::show::picture::Album;
 use crate::show::window::{self, SessionView, ViewState};
@@ -18,6 +17,7 @@ use trepan_geometry::Vec3;
 use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::{Camera, Frame, Image, Painter};
+use trepan_report::printable::capital;
 use trepan_runtime::View;
 use trepan_runtime::film::{Shot, position};
 use trepan_runtime::lockstep::up_to;

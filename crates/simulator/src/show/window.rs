@@ -5,14 +5,12 @@
 //! mouse pose at its own rate. Closing the window ends the session.
 
 use crate::SessionError;
-use crate::report::page::Shot;
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
 use crate::show::picture::{Album, Moving, first_view, frame, microscope, snap};
 use crate::show::raycast::Raycast;
-use crate::training::Guide;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
@@ -20,6 +18,8 @@ use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
 use trepan_patient::progress::Progress;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_report::page::Shot;
+use trepan_report::training::Guide;
 use trepan_runtime::lesson::{TEACHER_REQUESTS, Teacher};
 use trepan_runtime::stop::Stop;
 use trepan_runtime::watch::{PeerSession, Watching};

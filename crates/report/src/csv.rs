@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 /// A field of a line; one with a comma, a quote or a line's end is put in quotes.
-pub(crate) fn field(text: &str) -> Cow<'_, str> {
+pub fn field(text: &str) -> Cow<'_, str> {
     if text.contains([',', '"', '\n', '\r']) {
         Cow::Owned(format!("\"{}\"", text.replace('"', "\"\"")))
     } else {
@@ -15,7 +15,7 @@ pub(crate) fn field(text: &str) -> Cow<'_, str> {
 }
 
 /// A line of fields, with its end.
-pub(crate) fn line<T: AsRef<str>>(fields: impl IntoIterator<Item = T>) -> String {
+pub fn line<T: AsRef<str>>(fields: impl IntoIterator<Item = T>) -> String {
     let fields: Vec<String> = fields.into_iter().map(|text| field(text.as_ref()).into_owned()).collect();
     fields.join(",") + "\n"
 }

@@ -5,14 +5,14 @@
 //! show the same. Earlier sessions are those of the same person on the same case with the same
 //! lesson, or the same program without one.
 
-use crate::report::kept::SessionFolder;
+use crate::kept::SessionFolder;
 use crate::training::{Lesson, Mark};
 use serde::Serialize;
 use serde_json::Value;
 
 /// The debriefing of a session.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub(crate) struct Debrief {
+pub struct Debrief {
     /// The result in a sentence.
     pub headline: String,
     /// Whether the lesson is passed; `None` without a lesson.
@@ -31,7 +31,7 @@ pub(crate) struct Debrief {
 
 /// One measure of a session.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Row {
+pub struct Row {
     /// What is measured, with its unit.
     pub what: String,
     /// Its value.

@@ -1,7 +1,7 @@
 //! Text that is safe to print on a terminal.
 
 /// Escapes control characters, with which a file name could control the terminal.
-pub(crate) fn printable(text: &str) -> String {
+pub fn printable(text: &str) -> String {
     let shown = |c: char| match c {
         '\n' | '\t' => c.to_string(),
         c if c.is_control() => c.escape_default().to_string(),
@@ -13,18 +13,18 @@ pub(crate) fn printable(text: &str) -> String {
 }
 
 /// Begins a text with a large letter.
-pub(crate) fn capital(text: impl AsRef<str>) -> String {
+pub fn capital(text: impl AsRef<str>) -> String {
     let mut letters = text.as_ref().chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// A number with its noun, which takes an s unless the number is 1.
-pub(crate) fn count(number: usize, noun: &str) -> String {
+pub fn count(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Lines of cells, each column as wide as its longest cell.
-pub(crate) fn columns<const N: usize>(lines: impl IntoIterator<Item = [String; N]>) -> String {
+pub fn columns<const N: usize>(lines: impl IntoIterator<Item = [String; N]>) -> String {
     let lines: Vec<[String; N]> = lines.into_iter().collect();
     let long = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(long);

@@ -7,7 +7,7 @@
 //! # Sources
 //! W3C, Portable Network Graphics (PNG) Specification, third edition (2025): animation.
 
-use crate::error::SessionError;
+use crate::ReportError;
 use crate::printable::{count, printable};
 use std::fs;
 use std::io::{BufWriter, Write};
@@ -16,22 +16,22 @@ use std::process::ExitCode;
 use trepan_render::Image;
 
 /// The list of a film's pictures and their times, beside them.
-pub(crate) const LIST: &str = "film.ffconcat";
+pub const LIST: &str = "film.ffconcat";
 
 /// Makes an animated PNG of the film in a folder, or in the folder `window` of a session.
-pub(crate) fn make(folder: &Path, out: &Path) -> Result<ExitCode, SessionError> {
+pub fn make(folder: &Path, out: &Path) -> Result<ExitCode, ReportError> {
     if out.exists() {
-        return Err(SessionError::Usage(format!("{} exists already: name a file that does not", out.display())));
+        return Err(ReportError::Usage(format!("{} exists already: name a file that does not", out.display())));
     }
     let list = [folder.join(LIST), folder.join("window").join(LIST)].into_iter().find(|list| list.is_file());
     let none = || format!("no film lies in {}: give the folder that holds {LIST}", folder.display());
-    let list = list.ok_or_else(|| SessionError::Usage(none()))?;
-    let read = |fault: std::io::Error| SessionError::Usage(format!("{}: {fault}", list.display()));
+    let list = list.ok_or_else(|| ReportError::Usage(none()))?;
+    let read = |fault: std::io::Error| ReportError::Usage(format!("{}: {fault}", list.display()));
     let pictures = pictures(&fs::read_to_string(&list).map_err(read)?, list.parent().unwrap_or(folder));
     if pictures.is_empty() {
-        return Err(SessionError::Usage(none()));
+        return Err(ReportError::Usage(none()));
     }
-    let failed = SessionError::output(out);
+    let failed = ReportError::output(out);
     let beside = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = BufWriter::new(tempfile::NamedTempFile::new_in(beside).map_err(failed)?);
     animate(&pictures, &mut file)?;
@@ -60,11 +60,11 @@ fn pictures(list: &str, folder: &Path) -> Vec<FilmPicture> {
     pictures
 }
 
-fn animate(pictures: &[FilmPicture], out: &mut impl Write) -> Result<(), SessionError> {
-    let failed = |fault: png::EncodingError| SessionError::Internal(format!("the film: {fault}"));
+fn animate(pictures: &[FilmPicture], out: &mut impl Write) -> Result<(), ReportError> {
+    let failed = |fault: png::EncodingError| ReportError::Internal(format!("the film: {fault}"));
     let read = |path: &Path| {
         let image = fs::read(path).and_then(|bytes| Image::read_png(&bytes));
-        image.map_err(|fault| SessionError::Usage(format!("{}: {fault}", path.display())))
+        image.map_err(|fault| ReportError::Usage(format!("{}: {fault}", path.display())))
     };
     let mut before = read(&pictures[0].0)?;
     let mut encoder = png::Encoder::new(out, before.width, before.height);

@@ -4,7 +4,7 @@
 //! Units are mm, N and ms unless a name says otherwise.
 
 use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part, Trial};
-use crate::report::summary::Machine;
+use crate::summary::Machine;
 use serde::Serialize;
 use trepan_contact::GuardCounters;
 use trepan_geometry::Vec3;
@@ -13,7 +13,7 @@ use trepan_stages::by_cause;
 
 /// One tick of the test.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample {
+pub struct Sample {
     /// Time of the reading, ms.
     pub time_ms: f64,
     /// Duration of reading the device, µs.
@@ -33,7 +33,7 @@ pub(crate) struct Sample {
 /// How a test ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Ending {
+pub enum Ending {
     /// The test was completed.
     Done,
     /// The device's script ended.
@@ -46,7 +46,7 @@ pub(crate) enum Ending {
 
 /// Contents of `device.json`.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Measured {
+pub struct Measured {
     /// Requested name of the device.
     pub device: String,
     /// Name that the driver reports.
@@ -87,7 +87,7 @@ pub(crate) struct Measured {
 
 /// Timing of ticks and positions.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Timing {
+pub struct Timing {
     /// Duration of the test, s.
     pub seconds: f64,
     /// Requested tick rate, Hz.
@@ -112,7 +112,7 @@ pub(crate) struct Timing {
 
 /// Measurements at the virtual floor, a soft wall.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Floor {
+pub struct Floor {
     /// Stiffness, N/mm.
     pub stiffness_n_per_mm: f32,
     /// Force limit, N.
@@ -197,7 +197,7 @@ impl Floor {
 }
 
 /// Bounding box of the tip, mm; a point at the origin without samples.
-pub(crate) fn explored(samples: &[Sample]) -> [Vec3; 2] {
+pub fn explored(samples: &[Sample]) -> [Vec3; 2] {
     let tips = || samples.iter().filter(|s| s.fresh).map(|s| s.tip).filter(|tip| tip.is_finite());
     let low = tips().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
     [low, tips().reduce(Vec3::max).unwrap_or(Vec3::ZERO)]
@@ -214,7 +214,7 @@ fn gaps<'a>(samples: impl Iterator<Item = &'a Sample>) -> Vec<f64> {
 
 /// One finding of a device test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Finding {
+pub struct Finding {
     /// Whether the device passes.
     pub good: bool,
     /// Description; with a remedy if the device fails.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// A session in its folder.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct SessionFolder {
+pub struct SessionFolder {
     /// Its folder.
     pub folder: PathBuf,
     /// Date, time and name, as in the name of the folder.

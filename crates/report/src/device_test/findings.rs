@@ -5,7 +5,7 @@ use trepan_geometry::Vec3;
 use trepan_haptics::Capabilities;
 
 /// Derives the findings from the measurements.
-pub(crate) fn of(measured: &Measured, device: &Capabilities) -> Vec<Finding> {
+pub fn of(measured: &Measured, device: &Capabilities) -> Vec<Finding> {
     let [rate, pauses] = timing(&measured.timing);
     let mut found = vec![rate, pauses, range(measured, device), delay(measured, device), floor(&measured.floor)];
     found.extend(measured.fault.iter().map(|fault| Finding { good: false, text: fault.clone() }));

@@ -1,6 +1,6 @@
 //! Charts of a report, as SVG.
 
-use crate::error::SessionError;
+use crate::ReportError;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// A chart of a page.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Chart {
+pub struct Chart {
     caption: String,
     svg: String,
 }
@@ -22,7 +22,7 @@ impl Chart {
 
 /// One line of a chart.
 #[derive(Clone, Debug)]
-pub(crate) struct Curve {
+pub struct Curve {
     /// Name in the legend.
     pub name: &'static str,
     /// (x, y) in the chart's units.
@@ -59,7 +59,7 @@ fn plot<X, Y>(
     (x, y): (X, Y),
     legend: bool,
     draw: impl FnOnce(&mut Plane<'_, '_, X, Y>) -> Result<(), Fault>,
-) -> Result<String, SessionError>
+) -> Result<String, ReportError>
 where
     X: AsRangedCoord<Value = f64, CoordDescType: ValueFormatter<f64>>,
     Y: AsRangedCoord<Value = f64, CoordDescType: ValueFormatter<f64>>,
@@ -77,12 +77,12 @@ where
         }
         root.present()
     })();
-    drawn.map_err(|fault: Fault| SessionError::Internal(format!("{what}: {fault}")))?;
+    drawn.map_err(|fault: Fault| ReportError::Internal(format!("{what}: {fault}")))?;
     Ok(svg)
 }
 
 /// Draws curves over session time, s. `limit` is a dashed line with its label.
-pub(crate) fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Result<String, SessionError> {
+pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Result<String, ReportError> {
     let curves: Vec<Curve> = curves.iter().map(thinned).collect();
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let end = points().map(|p| p.0).fold(1e-3, f64::max);
@@ -105,7 +105,7 @@ pub(crate) fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>
 }
 
 /// Draws curves in a plane; `axes` are its labels with units.
-pub(crate) fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, SessionError> {
+pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, ReportError> {
     let is_finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
     let points = || curves.iter().flat_map(|curve| &curve.points).filter(|p| is_finite(p));
     let span = |of: fn(&(f64, f64)) -> f64| {
@@ -127,7 +127,7 @@ pub(crate) fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, Sessio
 
 /// Draws a histogram of times with logarithmic axes. `what` is the label of the time axis; `bins`
 /// are (upper edge in µs, count).
-pub(crate) fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, SessionError> {
+pub fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, ReportError> {
     let used: Vec<(f64, f64)> =
         bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
     let low = used.first().map_or(0.1, |b| 0.7 * b.0);

@@ -15,7 +15,7 @@ use trepan_stages::program::Program;
 
 /// A lesson.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Lesson {
+pub struct Lesson {
     /// Short name, as in summaries.
     pub name: String,
     /// Title.
@@ -39,7 +39,7 @@ pub(crate) struct Lesson {
 
 /// One step of a lesson.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Step {
+pub struct Step {
     /// What to do.
     pub text: String,
     /// What is measured to end the step.
@@ -53,7 +53,7 @@ pub(crate) struct Step {
 /// What is measured in a running session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Measure {
+pub enum Measure {
     /// Depth in bone, mm.
     BoneDepthMm,
     /// Depth in tissue, mm.
@@ -76,7 +76,7 @@ pub(crate) enum Measure {
 
 /// A pass mark.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Mark {
+pub struct Mark {
     /// What is measured.
     pub text: String,
     /// Where it stands in the summary: keys with points between them.
@@ -187,7 +187,7 @@ fn within(value: f64, least: Option<f64>, most: Option<f64>) -> bool {
 
 /// A lesson while its session runs.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Guide {
+pub struct Guide {
     lesson: Lesson,
     at: usize,
 }

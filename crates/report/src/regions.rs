@@ -35,7 +35,7 @@ const DEPTHS_MM: [f32; 5] = [1.0, 0.0, 2.0, 3.0, 4.0];
 const MAX_TICK_S: f64 = 0.1;
 
 /// Returns the regions that were pressed, largest impulse first.
-pub(crate) fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Region> {
+pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Region> {
     let middle = brain.mesh.bounds().centre().x;
     let mut all: Vec<Region> = Vec::new();
     for pair in ticks.windows(2).filter(|pair| pair[1].tissue_depth_mm > 0.0 && pair[1].phase == 1) {
@@ -60,7 +60,7 @@ pub(crate) fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) ->
 }
 
 /// Returns the point of the brain at rest that a tick touches, world mm.
-pub(crate) fn touched(brain: &DistanceField, tray: &[Tool], tick: &TickRecord) -> Vec3 {
+pub fn touched(brain: &DistanceField, tray: &[Tool], tick: &TickRecord) -> Vec3 {
     let radius_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
     let normal = tick.tissue_normal();
     let under = tick.proxy.translation - radius_mm * normal;

@@ -7,14 +7,14 @@
 
 use crate::config::SessionConfig;
 use crate::error::SessionError;
-use crate::printable::{count, printable};
-use crate::report::csv;
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::stream;
 use trepan_link::wire::{SessionHeader, TickRecord};
+use trepan_report::csv;
+use trepan_report::printable::{count, printable};
 use trepan_stages::force_scale::ForceScale;
 use trepan_stages::program::{Phase, Program};
 
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn the_layout_for_foxglove_plots_what_a_recording_has() {
-        let layout = include_str!("../../../link/foxglove-layout.json");
+        let layout = include_str!("../../link/foxglove-layout.json");
         let scores = serde_json::to_value(trepan_stages::ScoreKeeper::default()).unwrap();
         let plotted: Vec<&str> = layout.split('"').filter_map(|text| text.strip_prefix("/score.")).collect();
         assert!(plotted.len() >= 3 && plotted.iter().all(|name| scores.get(name).is_some()), "{plotted:?}");

@@ -12,8 +12,8 @@ mod measured;
 mod page;
 mod trial;
 
-use crate::error::SessionError;
-use crate::report::summary::Machine;
+use crate::ReportError;
+use crate::summary::Machine;
 use crate::whole::whole;
 use measured::{Ending, Floor, Measured, Sample, TestRun, Timing};
 use std::fmt::Display;
@@ -43,14 +43,14 @@ struct Subject {
 
 /// Tests a device for some seconds and writes `device.json` and `device.html` to `out`. Returns the
 /// signal that ended the test, if any.
-pub(crate) fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
+pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, ReportError> {
     if !(8.0..=600.0).contains(&seconds) {
-        return Err(SessionError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
+        return Err(ReportError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
     }
     if out.exists() && !out.is_dir() {
-        return Err(SessionError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
+        return Err(ReportError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
     }
-    let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
+    let stop = Stop::on_signals().map_err(|fault| ReportError::Internal(format!("signals: {fault}")))?;
     let subject = open(name, 1e3 * seconds)?;
     let (found, samples) = test(subject, 1e3 * seconds, &stop);
     write(&found, &samples, out)?;
@@ -59,13 +59,13 @@ pub(crate) fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, S
     }
     println!("report: {}", out.join("device.html").display());
     if found.ended == Ending::Lost {
-        return Err(SessionError::Usage(format!("{name} was lost during the test; see the report")));
+        return Err(ReportError::Usage(format!("{name} was lost during the test; see the report")));
     }
     Ok(stop.signal())
 }
 
-fn open(name: &str, end_ms: f64) -> Result<Subject, SessionError> {
-    let usage = |fault: &dyn Display| SessionError::Usage(fault.to_string());
+fn open(name: &str, end_ms: f64) -> Result<Subject, ReportError> {
+    let usage = |fault: &dyn Display| ReportError::Usage(fault.to_string());
     let name: DeviceName = name.parse().map_err(|fault: NameError| usage(&fault))?;
     if !matches!(name.kind().motion, Motion::Hardware | Motion::Script) {
         return Err(usage(&format!("{name} cannot be tested; `--list-devices` shows the devices that can")));
@@ -205,11 +205,11 @@ fn measured(device: String, able: &Capabilities, run: &TestRun, watch: Option<&W
     found
 }
 
-fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), SessionError> {
+fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), ReportError> {
     let json = serde_json::to_vec_pretty(found);
-    let json = json.map_err(|fault| SessionError::Internal(format!("device.json: {fault}")))?;
+    let json = json.map_err(|fault| ReportError::Internal(format!("device.json: {fault}")))?;
     let page = page::html(found, samples)?;
-    fs::create_dir_all(out).map_err(SessionError::output(out))?;
+    fs::create_dir_all(out).map_err(ReportError::output(out))?;
     whole(&out.join("device.json"), &json)?;
     whole(&out.join("device.html"), page.as_bytes())
 }

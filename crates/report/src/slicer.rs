@@ -2,13 +2,13 @@
 //!
 //! # Practice
 //! One file each, positions in LPS: x and y are those of RAS with the other sign. The path has a
-//! point where the tool moved [`APART_MM`], at most [`MOST_POINTS`]: each is a handle in Slicer.
+//! point where the tool moved `APART_MM`, at most `MOST_POINTS`: each is a handle in Slicer.
 //!
 //! # Sources
 //! Schema v1.0.3:
 //! <https://github.com/Slicer/Slicer/tree/main/Modules/Loadable/Markups/Resources/Schema>.
 
-use crate::error::SessionError;
+use crate::ReportError;
 use crate::whole::whole;
 use serde_json::{Value, json};
 use std::f32::consts::TAU;
@@ -18,13 +18,13 @@ use trepan_link::wire::TickRecord;
 use trepan_patient::Plan;
 
 /// The point where the skull is opened, and those below it.
-pub(crate) const OPENING: &str = "opening.mrk.json";
+pub const OPENING: &str = "opening.mrk.json";
 /// The line along which it is opened.
-pub(crate) const PLAN: &str = "plan.mrk.json";
+pub const PLAN: &str = "plan.mrk.json";
 /// The planned outline on the outer table: of the flap, or of the burr hole.
-pub(crate) const FLAP: &str = "flap-line.mrk.json";
+pub const FLAP: &str = "flap-line.mrk.json";
 /// The path of the tool's tip.
-pub(crate) const PATH: &str = "tool-path.mrk.json";
+pub const PATH: &str = "tool-path.mrk.json";
 
 const SCHEMA: &str = "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#";
 /// A numerical parameter: least distance of two points of the path, mm.
@@ -35,10 +35,10 @@ const MOST_POINTS: usize = 2000;
 const ROUND: usize = 24;
 
 /// Writes the four files.
-pub(crate) fn write(out: &Path, plan: &Plan, ticks: &[TickRecord]) -> Result<(), SessionError> {
+pub fn write(out: &Path, plan: &Plan, ticks: &[TickRecord]) -> Result<(), ReportError> {
     for (name, markup) in files(plan, ticks) {
         let json = serde_json::to_vec_pretty(&json!({ "@schema": SCHEMA, "markups": [markup] }));
-        whole(&out.join(name), &json.map_err(|fault| SessionError::Internal(format!("{name}: {fault}")))?)?;
+        whole(&out.join(name), &json.map_err(|fault| ReportError::Internal(format!("{name}: {fault}")))?)?;
     }
     Ok(())
 }

@@ -6,17 +6,17 @@
 
 use crate::error::SessionError;
 use crate::options::SessionFilter;
-use crate::printable::{columns, count, printable};
-use crate::report::csv;
-use crate::report::debrief::Debrief;
-use crate::report::kept::SessionFolder;
 use crate::settings::{Recent, Settings, sessions};
-use crate::training::Lesson;
-use crate::whole::whole;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use trepan_report::csv;
+use trepan_report::debrief::Debrief;
+use trepan_report::kept::SessionFolder;
+use trepan_report::printable::{columns, count, printable};
+use trepan_report::training::Lesson;
+use trepan_report::whole::whole;
 
 /// One session in the table.
 #[derive(Clone, Debug, Default, PartialEq)]

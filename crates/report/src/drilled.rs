@@ -17,7 +17,7 @@
 //! Only a box around the removed bone is computed: a second for a large flap. On the nodes a skull
 //! of 1 mm has eight times its voxels.
 
-use crate::report::summary::RemovedLabel;
+use crate::summary::RemovedLabel;
 use glam::{DVec3, IVec3, USizeVec3};
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -39,7 +39,7 @@ const MARGIN_MM: f64 = 2.0;
 
 /// The drilled skull in the scanner's voxels.
 #[derive(Clone, Debug)]
-pub(crate) struct Drilled {
+pub struct Drilled {
     /// Its densities, HU.
     pub densities: VoxelVolume<i16>,
     /// 1 where half or more of a voxel of bone, by the isovalue, was removed, else 0.
@@ -55,7 +55,7 @@ impl Drilled {
 }
 
 /// Removes from a CT the bone that was removed since it was scanned.
-pub(crate) fn drilled(mut ct: VoxelVolume<i16>, bone: &BoneVolume) -> Drilled {
+pub fn drilled(mut ct: VoxelVolume<i16>, bone: &BoneVolume) -> Drilled {
     let mut removed = VoxelVolume::filled(ct.dims, ct.world_from_voxel, 0u8);
     let Some((low, high)) = gone_box(bone) else { return Drilled { densities: ct, removed } };
     let part = Part::of(&ct, low, high);
@@ -72,12 +72,12 @@ pub(crate) fn drilled(mut ct: VoxelVolume<i16>, bone: &BoneVolume) -> Drilled {
 
 /// The bone that is left, HU on the nodes of the cut. The CT between its voxels lies under a ramp
 /// through the isovalue at the cut.
-pub(crate) fn on_nodes(bone: &BoneVolume) -> VoxelVolume<i16> {
+pub fn on_nodes(bone: &BoneVolume) -> VoxelVolume<i16> {
     nodes_within(bone, IVec3::ZERO, bone.cut_nodes() * (IVec3::from(bone.dims().map(|n| n as i32)) - 1))
 }
 
 /// The same around the bone that was removed; `None` if nothing was.
-pub(crate) fn on_nodes_around(bone: &BoneVolume) -> Option<VoxelVolume<i16>> {
+pub fn on_nodes_around(bone: &BoneVolume) -> Option<VoxelVolume<i16>> {
     let (low, high) = gone_box(bone)?;
     let node = |place: DVec3| bone.node_at(place.as_vec3()).round().as_ivec3();
     let last = bone.cut_nodes() * (IVec3::from(bone.dims().map(|n| n as i32)) - 1);

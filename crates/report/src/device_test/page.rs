@@ -1,15 +1,15 @@
 //! Writes `device.html`: the results of a device test on one self-contained page.
 
+use crate::ReportError;
+use crate::chart::{Chart, Curve, histogram, over_time, traces};
 use crate::device_test::measured::{Measured, Sample};
 use crate::device_test::trial::Part;
-use crate::error::SessionError;
-use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
-use crate::report::page::{Table, render, rows};
+use crate::page::{Table, render, rows};
 use serde_json::json;
 use trepan_runtime::Times;
 
 /// Builds the page.
-pub(super) fn html(found: &Measured, samples: &[Sample]) -> Result<String, SessionError> {
+pub(super) fn html(found: &Measured, samples: &[Sample]) -> Result<String, ReportError> {
     let context = json!({
         "title": format!("Trepan: test of {}", found.device),
         "found": found,
@@ -19,7 +19,7 @@ pub(super) fn html(found: &Measured, samples: &[Sample]) -> Result<String, Sessi
     render("device.html", &context)
 }
 
-fn charts(samples: &[Sample], asked_hz: f64) -> Result<[Chart; 6], SessionError> {
+fn charts(samples: &[Sample], asked_hz: f64) -> Result<[Chart; 6], ReportError> {
     let over = |name, value: fn(&Sample) -> f32| Curve::over_time(name, samples, |s| (s.time_ms, value(s)));
     let of = |name, part: Option<Part>, point: fn(&Sample) -> (f32, f32)| {
         let points = samples.iter().filter(|s| part.is_none_or(|part| s.part == part)).map(point);

@@ -1,12 +1,12 @@
 //! `report.html`: a self-contained page on a session with pictures, curves from the recording,
 //! scores and the machine.
 
+use crate::ReportError;
+use crate::chart::{Chart, Curve, histogram, over_time, traces};
 use crate::constants;
-use crate::error::SessionError;
+use crate::debrief::Debrief;
 use crate::models::{ModelSummary, TissueSummary};
-use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
-use crate::report::debrief::Debrief;
-use crate::report::summary::{Raised, Summary};
+use crate::summary::{Raised, Summary};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::value::Serde;
@@ -22,7 +22,7 @@ use trepan_stages::force_scale::ForceScale;
 
 /// A picture for the report.
 #[derive(Clone, Debug)]
-pub(crate) struct Shot {
+pub struct Shot {
     /// Caption of the picture.
     pub caption: String,
     /// PNG bytes.
@@ -31,31 +31,31 @@ pub(crate) struct Shot {
 
 /// Templates of all pages and of their parts.
 const TEMPLATES: [(&str, &str); 7] = [
-    ("page.html", include_str!("../../templates/page.html")),
-    ("events.html", include_str!("../../templates/events.html")),
-    ("charts.html", include_str!("../../templates/charts.html")),
-    ("tables.html", include_str!("../../templates/tables.html")),
-    ("report.html", include_str!("../../templates/report.html")),
-    ("device.html", include_str!("../../templates/device.html")),
-    ("compare.html", include_str!("../../templates/compare.html")),
+    ("page.html", include_str!("../templates/page.html")),
+    ("events.html", include_str!("../templates/events.html")),
+    ("charts.html", include_str!("../templates/charts.html")),
+    ("tables.html", include_str!("../templates/tables.html")),
+    ("report.html", include_str!("../templates/report.html")),
+    ("device.html", include_str!("../templates/device.html")),
+    ("compare.html", include_str!("../templates/compare.html")),
 ];
 
 /// Renders a template; texts of the context are escaped for HTML.
-pub(crate) fn render(template: &str, context: &impl Serialize) -> Result<String, SessionError> {
+pub fn render(template: &str, context: &impl Serialize) -> Result<String, ReportError> {
     let mut all = Environment::new();
     all.set_undefined_behavior(UndefinedBehavior::Strict);
     let added = TEMPLATES.into_iter().try_for_each(|(name, text)| all.add_template(name, text));
     let page = added.and_then(|()| all.get_template(template)?.render(Serde(context)));
-    page.map_err(|fault| SessionError::Internal(format!("{template}: {fault:#}")))
+    page.map_err(|fault| ReportError::Internal(format!("{template}: {fault:#}")))
 }
 
 /// Returns the page as HTML.
-pub(crate) fn html(
+pub fn html(
     summary: &Summary,
     outcome: &Outcome,
     recording: &Recording,
     (debrief, shots): (&Debrief, &[Shot]),
-) -> Result<String, SessionError> {
+) -> Result<String, ReportError> {
     let shot = |Shot { caption, png }: &Shot| json!({ "caption": caption, "png": STANDARD.encode(png) });
     let context = json!({
         "title": format!("Trepan {}: {}", summary.app, summary.case),
@@ -111,7 +111,7 @@ fn faults(warnings: &[Raised]) -> Vec<serde_json::Value> {
 }
 
 /// Draws the learning curves: each measure over the number of the session.
-fn learning(debrief: &Debrief) -> Result<Vec<Chart>, SessionError> {
+fn learning(debrief: &Debrief) -> Result<Vec<Chart>, ReportError> {
     let chart = |(name, values): &(String, Vec<f64>)| {
         let points = values.iter().enumerate().map(|(at, value)| (at as f64 + 1.0, *value)).collect();
         let svg = traces(["session", name], &[Curve { name: "sessions", points }])?;
@@ -134,7 +134,7 @@ fn parts(ModelSummary { bone, tissue, picture, .. }: &ModelSummary) -> [serde_js
 
 /// An event of a session, as its page lists it.
 #[derive(Debug, Serialize)]
-pub(crate) struct Event {
+pub struct Event {
     /// Session time, s.
     pub seconds: f64,
     /// Description.
@@ -164,7 +164,7 @@ fn events(outcome: &Outcome, recording: &Recording) -> Vec<Event> {
 /// Kind of the events of a teacher's requests.
 const TEACHER: &str = "teacher";
 
-fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 6], SessionError> {
+fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 6], ReportError> {
     let Recording { ticks, second, solver, .. } = recording;
     let of = |name, value: fn(&TickRecord) -> f32| Curve::over_time(name, ticks, |t| (t.time_ms, value(t)));
     let moved = Curve::over_time("largest displacement", solver, |s| (s.time_ms, s.max_displacement_mm));
@@ -200,7 +200,7 @@ const SCORES: &str = "scores bone_removed_mm3 plan cut_off hand_force_n hand_for
 
 /// A table of a page.
 #[derive(Serialize)]
-pub(crate) struct Table {
+pub struct Table {
     /// Heading.
     pub title: &'static str,
     /// Its rows.
@@ -209,14 +209,14 @@ pub(crate) struct Table {
 
 /// A value of a JSON file, its path and its unit.
 #[derive(Serialize)]
-pub(crate) struct Row {
+pub struct Row {
     path: String,
     value: String,
     unit: &'static str,
 }
 
 /// Lists every number of the summary by its path: scores, timings, the rest.
-fn tables(summary: &Summary) -> Result<[Table; 3], SessionError> {
+fn tables(summary: &Summary) -> Result<[Table; 3], ReportError> {
     let under = |row: &Row, paths: &str| {
         let is_under = |rest: &str| rest.is_empty() || rest.starts_with('.');
         paths.split(' ').any(|path| row.path.strip_prefix(path).is_some_and(is_under))
@@ -228,8 +228,8 @@ fn tables(summary: &Summary) -> Result<[Table; 3], SessionError> {
 }
 
 /// Lists the values of a JSON file; `name` names it in an error.
-pub(crate) fn rows(name: &str, file: &impl Serialize) -> Result<Vec<Row>, SessionError> {
-    let value = serde_json::to_value(file).map_err(|fault| SessionError::Internal(format!("{name}: {fault}")))?;
+pub fn rows(name: &str, file: &impl Serialize) -> Result<Vec<Row>, ReportError> {
+    let value = serde_json::to_value(file).map_err(|fault| ReportError::Internal(format!("{name}: {fault}")))?;
     let mut rows = Vec::new();
     add_rows("", &value, &mut rows);
     Ok(rows)
@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn a_report_begins_with_the_result_and_folds_the_models() {
         let (summary, outcome) = (Summary::default(), Outcome::default());
-        let row = |passed: Option<bool>| crate::report::debrief::Row {
+        let row = |passed: Option<bool>| crate::debrief::Row {
             what: "plunge".into(),
             value: "0.4".into(),
             limit: passed.map_or(String::new(), |_| "at most 1 mm".into()),

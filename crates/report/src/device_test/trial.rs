@@ -21,13 +21,13 @@ use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_haptics::{Capabilities, Reading, Status};
 
 /// Stiffness of the floor, N/mm.
-pub(crate) const FLOOR_N_PER_MM: f32 = 0.3;
+pub const FLOOR_N_PER_MM: f32 = 0.3;
 /// Force limit of the floor, N.
-pub(crate) const FLOOR_N: f32 = 1.0;
+pub const FLOOR_N: f32 = 1.0;
 /// Force of a tap, N.
 const TAP_N: f32 = 0.8;
 /// Duration of a tap, ms.
-pub(crate) const TAP_MS: f64 = 25.0;
+pub const TAP_MS: f64 = 25.0;
 /// Period of the taps, ms: a light hand oscillates for a third of a second after a tap.
 const TAP_PERIOD_MS: f64 = 400.0;
 /// Duration of all taps, ms: an even number of periods.
@@ -41,7 +41,7 @@ const EXPLORE: f64 = 0.4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u8)]
-pub(crate) enum Part {
+pub enum Part {
     /// Move through the whole range.
     Explore,
     /// Press down.
@@ -70,7 +70,7 @@ impl Part {
 }
 
 /// State of one test.
-pub(crate) struct Trial {
+pub struct Trial {
     end_ms: f64,
     tick_ms: f32,
     driven: bool,

@@ -23,9 +23,9 @@ use trepan_rigid::removal::Cutter;
 use trepan_stages::score::ScoreKeeper;
 
 /// Stiffness of brain, with its spread between sources.
-pub(crate) const STIFFNESS: Row = sensitivity::SHEAR_MODULUS;
+pub const STIFFNESS: Row = sensitivity::SHEAR_MODULUS;
 /// Energy of cutting bone.
-pub(crate) const ENERGY: Row = drilling::BURR_ENERGY;
+pub const ENERGY: Row = drilling::BURR_ENERGY;
 /// Radius of the burr that the session begins with, mm.
 const BURR_MM: f32 = 3.0;
 /// Largest power that a time of drilling takes from the energy: nearer to rubbing the first order
@@ -53,7 +53,7 @@ impl Band {
     /// Band of a force of tissue, N.
     ///
     /// The hand stands `way_mm` past the rest surface, `depth_mm` of that in the present one.
-    pub(crate) fn of_tissue_force(force_n: f32, way_mm: f32, depth_mm: f32) -> Self {
+    pub fn of_tissue_force(force_n: f32, way_mm: f32, depth_mm: f32) -> Self {
         let power = ((way_mm - depth_mm) / way_mm).clamp(0.0, 1.0);
         // Tissue that moved towards the tool, or an unknown way: the widest band.
         let known = way_mm > depth_mm && power.is_finite();
@@ -61,7 +61,7 @@ impl Band {
     }
 
     /// Band of a time of drilling, s, under a mean load, newtons of the task.
-    pub(crate) fn of_drilling(seconds: f64, load_n: f64) -> Self {
+    pub fn of_drilling(seconds: f64, load_n: f64) -> Self {
         let cuts_n = load_n - f64::from(Cutter::BURR.rubbing_n(BURR_MM));
         Self::of(seconds, &ENERGY, if cuts_n > 0.0 { (load_n / cuts_n).min(MOST_POWER) } else { MOST_POWER })
     }
@@ -78,7 +78,7 @@ pub struct Bands {
 
 impl Bands {
     /// Bands of scores; `scale` is the newtons at the hand per newton of the task, on bone.
-    pub(crate) fn of(scores: &ScoreKeeper, scale: f32) -> Self {
+    pub fn of(scores: &ScoreKeeper, scale: f32) -> Self {
         let ScoreKeeper { peak_tissue_force_n, peak_tissue, drilling_s, cutting: [newton_s, cutting_s], .. } = *scores;
         let load_n = newton_s / (cutting_s * f64::from(scale));
         let [way_mm, depth_mm] = peak_tissue;
@@ -90,7 +90,7 @@ impl Bands {
     }
 
     /// Each band in a sentence.
-    pub(crate) fn sentences(&self) -> Vec<String> {
+    pub fn sentences(&self) -> Vec<String> {
         let force = self.tissue_force_n.map(|Band { value, low, high }| {
             format!(
                 "The brain was pressed with up to {value:.2} N; as soft or stiff as brains may be, {low:.2} to {high:.2} N."
@@ -104,14 +104,14 @@ impl Bands {
 }
 
 /// Error of a force by the method beside what the constants leave open, in words.
-pub(crate) fn beside(error_n: f64, force_n: f64) -> String {
+pub fn beside(error_n: f64, force_n: f64) -> String {
     let Band { low, high, .. } = Band::of(100.0, &STIFFNESS, 1.0);
     let by_method = 100.0 * error_n / force_n;
     format!("model error {by_method:.0} % of the force, constants -{:.0} to +{:.0} %", 100.0 - low, high - 100.0)
 }
 
 /// How far finer models can bring forces and times nearer to the patient's, in words.
-pub(crate) fn limits() -> String {
+pub fn limits() -> String {
     format!(
         "constants: tissue is known within a factor of {:.2} in stiffness, bone within {:.2} in the energy of cutting; \
          models finer than that agree better with each other, not with the patient ({})\n",

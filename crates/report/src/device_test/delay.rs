@@ -18,7 +18,7 @@ const STILL: (f32, f64) = (0.15, 20.0);
 
 /// Median delay from a tap to the first motion along it, ms, over taps on a still hand. `None` if
 /// most taps caused no motion.
-pub(crate) fn median_ms(samples: &[Sample]) -> Option<f64> {
+pub fn median_ms(samples: &[Sample]) -> Option<f64> {
     let begins = |at: &usize| {
         let (before, now) = (&samples[at - 1], &samples[*at]);
         now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO && is_still(&samples[..=*at])

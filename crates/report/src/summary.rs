@@ -1,7 +1,7 @@
 //! `summary.json`: the results of a session as numbers.
 
 use crate::models::ModelSummary;
-use crate::report::regions::Region;
+use crate::regions::Region;
 use crate::uncertainty::Bands;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -120,7 +120,7 @@ pub struct Opening {
 
 impl Opening {
     /// The opening of a plan.
-    pub(crate) fn of(plan: &Plan) -> Self {
+    pub fn of(plan: &Plan) -> Self {
         let Plan { site, hole_mm, flap_mm, .. } = plan;
         let (entry_mm, inward) = (site.entry.to_array(), site.inward.to_array());
         Self { entry_mm, inward, bone_mm: site.bone_mm, hole_mm: *hole_mm, flap_mm: *flap_mm }
@@ -273,7 +273,7 @@ impl Machine {
 impl Summary {
     /// Adds the outcome at the end of a session: all that the loops measured. The remarks of both
     /// are joined.
-    pub(crate) fn with(self, outcome: &Outcome) -> Self {
+    pub fn with(self, outcome: &Outcome) -> Self {
         let rate_hz = outcome.ticks.count as f64 / outcome.seconds.max(1e-9);
         let slow = outcome.replayed.is_none().then(|| slow(rate_hz, self.asked_hz)).flatten();
         let behind = outcome
@@ -314,7 +314,7 @@ impl Summary {
 }
 
 /// Returns the pictures per second of drawing; 0 without pictures.
-pub(crate) fn fps(frames: u64, drawn_s: f64) -> f64 {
+pub fn fps(frames: u64, drawn_s: f64) -> f64 {
     if frames > 0 { frames as f64 / drawn_s.max(1e-3) } else { 0.0 }
 }
 
@@ -322,7 +322,7 @@ pub(crate) fn fps(frames: u64, drawn_s: f64) -> f64 {
 const FULL_RATE: f64 = 0.995;
 
 /// Returns a remark where the haptic rate was lower than requested.
-pub(crate) fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
+pub fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
     (rate_hz < FULL_RATE * asked_hz).then(|| {
         format!(
             "SLOW: {rate_hz:.1} of {asked_hz:.0} ticks a second, forces came late: do not compare them; close programs, \
@@ -332,7 +332,7 @@ pub(crate) fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
 }
 
 /// Returns a remark where the brain was slower than real time.
-pub(crate) fn behind(real_time_factor: f64) -> Option<String> {
+pub fn behind(real_time_factor: f64) -> Option<String> {
     (real_time_factor < f64::from(REAL_TIME)).then(|| {
         format!(
             "SLOW: the brain moved at {real_time_factor:.2} of real time and felt wrong: do not compare its forces; close \

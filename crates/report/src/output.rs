@@ -1,12 +1,12 @@
 //! Writes the output files of a session, each of them atomically.
 
-use crate::error::SessionError;
-use crate::report::debrief::Debrief;
-use crate::report::drilled::{self, Drilled};
-use crate::report::page::{self, Shot};
-use crate::report::summary::Summary;
-use crate::report::{csv, slicer};
+use crate::ReportError;
+use crate::debrief::Debrief;
+use crate::drilled::{self, Drilled};
+use crate::page::{self, Shot};
+use crate::summary::Summary;
 use crate::whole::whole;
+use crate::{csv, slicer};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
@@ -38,9 +38,9 @@ const NAMES: [&str; 14] = [
     RECORDING,
 ];
 /// Default name of the recording; `--record` gives another.
-pub(crate) const RECORDING: &str = "session.mcap";
+pub const RECORDING: &str = "session.mcap";
 /// The film of a recording's session, beside it.
-pub(crate) fn scene_of(record: &Path) -> PathBuf {
+pub fn scene_of(record: &Path) -> PathBuf {
     record.with_extension("scene")
 }
 
@@ -50,12 +50,12 @@ const MOST_LETTERS: usize = 60;
 const FRAMES: &str = "frames";
 
 /// Whether a folder holds files of a session.
-pub(crate) fn holds_session(out: &Path) -> bool {
+pub fn holds_session(out: &Path) -> bool {
     NAMES.iter().any(|name| out.join(name).exists())
 }
 
 /// Returns a new folder below `ROOT/PROGRAM`, named after the time (UTC) and the session's name.
-pub(crate) fn dated(program: Program, root: Option<&Path>, name: Option<&str>) -> PathBuf {
+pub fn dated(program: Program, root: Option<&Path>, name: Option<&str>) -> PathBuf {
     let now = seconds_now();
     let place = root.unwrap_or(Path::new("trepan-out")).join(program.name());
     let fit = |c: char| if c.is_alphanumeric() { c } else { '-' };
@@ -75,7 +75,7 @@ fn seconds_now() -> u64 {
 }
 
 /// The present date and time, UTC as in RFC 3339.
-pub(crate) fn now() -> String {
+pub fn now() -> String {
     rfc_3339(seconds_now())
 }
 
@@ -102,7 +102,7 @@ fn date_and_time(seconds: u64) -> String {
 /// Folder of a session that is being written. Dropped before [`keep`](Self::keep), it removes the
 /// session's files; a recording that can be opened is kept, up to its last whole chunk.
 #[derive(Debug)]
-pub(crate) struct Files {
+pub struct Files {
     out: PathBuf,
     record: PathBuf,
     /// Folders that this session created, the deepest first.
@@ -112,11 +112,11 @@ pub(crate) struct Files {
 
 impl Files {
     /// Creates the folder and its folder for pictures, and removes the files of an older session.
-    pub fn make(out: &Path, record: &Path) -> Result<Self, SessionError> {
+    pub fn make(out: &Path, record: &Path) -> Result<Self, ReportError> {
         let missing = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let made = missing.map(PathBuf::from).collect();
         let files = Self { out: out.into(), record: record.into(), made, kept: false };
-        let failed = SessionError::output(out);
+        let failed = ReportError::output(out);
         fs::create_dir_all(out.join(FRAMES)).map_err(failed)?;
         files.clear()?;
         Ok(files)
@@ -128,13 +128,13 @@ impl Files {
     }
 
     /// Removes a session's files and pictures, except those that the user took in the window.
-    fn clear(&self) -> Result<(), SessionError> {
+    fn clear(&self) -> Result<(), ReportError> {
         let frames = self.out.join(FRAMES);
         let pictures = fs::read_dir(&frames).into_iter().flatten().flatten();
         let pictures = pictures.map(|entry| entry.path()).filter(|path| path.extension() == Some(OsStr::new("png")));
         let files = NAMES.iter().map(|name| self.out.join(name)).chain([self.record.clone(), scene_of(&self.record)]);
         for path in files.filter(|path| path.exists()).chain(pictures) {
-            fs::remove_file(&path).map_err(SessionError::output(&path))?;
+            fs::remove_file(&path).map_err(ReportError::output(&path))?;
         }
         Ok(())
     }
@@ -163,14 +163,14 @@ impl Drop for Files {
 /// Writes the drilled skull: its densities, HU, and the labels of what was removed. If asked, also
 /// the densities on the nodes around what was removed, and with `surface` the isosurface as
 /// triangles.
-pub(crate) fn skull(
+pub fn skull(
     out: &Path,
     drilled: &Drilled,
     around: Option<&VoxelVolume<i16>>,
     bone: &BoneVolume,
     surface: bool,
-) -> Result<(), SessionError> {
-    let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
+) -> Result<(), ReportError> {
+    let failed = |fault: &dyn std::fmt::Display| ReportError::Usage(format!("{fault}; give another folder with --out"));
     write_beside(out, "removed-label", &drilled.removed).map_err(|fault| failed(&fault))?;
     for (name, volume) in [("drilled", Some(&drilled.densities)), ("drilled-fine", around)] {
         volume.map_or(Ok(()), |volume| write_beside(out, name, volume).map(drop)).map_err(|fault| failed(&fault))?;
@@ -183,15 +183,15 @@ pub(crate) fn skull(
 }
 
 /// Writes summary, scores and report.
-pub(crate) fn write(
+pub fn write(
     out: &Path,
     recording: &Recording,
     summary: &Summary,
     outcome: &Outcome,
     (debrief, shots): (&Debrief, &[Shot]),
-) -> Result<(), SessionError> {
+) -> Result<(), ReportError> {
     let json =
-        serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
+        serde_json::to_vec_pretty(summary).map_err(|fault| ReportError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
     whole(&out.join("scores.csv"), scores(summary).as_bytes())?;
     let page = page::html(summary, outcome, recording, (debrief, shots))?;
@@ -247,7 +247,7 @@ fn scores(summary: &Summary) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::summary::Raised;
+    use crate::summary::Raised;
 
     #[test]
     fn a_time_gives_a_name_that_sorts() {

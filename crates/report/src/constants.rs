@@ -2,7 +2,7 @@
 //! a measurement.
 //!
 //! # Practice
-//! [`USED`] is compared with the sources by a test: a row that some crate uses and the list lacks
+//! `USED` is compared with the sources by a test: a row that some crate uses and the list lacks
 //! fails it, as does one that nothing uses any more. `--list-constants`, the report, the
 //! README and the user guide derive from the list; `TREPAN_WRITE=1 cargo test -p trepan-simulator
 //! --lib constants` brings the list, the README and the user guide up to date.
@@ -140,7 +140,7 @@ fn rows() -> impl Iterator<Item = &'static Row> {
 
 /// A constant, for a report.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Constant {
+pub struct Constant {
     name: String,
     value: String,
     condition: &'static str,
@@ -150,7 +150,7 @@ pub(crate) struct Constant {
 }
 
 /// All constants, those that rest on a measurement first.
-pub(crate) fn all() -> Vec<Constant> {
+pub fn all() -> Vec<Constant> {
     let of = |row: &'static Row| {
         let spread = if row.spread.is_nan() { String::new() } else { format!(" ± {}", row.spread) };
         Constant {
@@ -168,7 +168,7 @@ pub(crate) fn all() -> Vec<Constant> {
 }
 
 /// How many constants rest on a measurement, in a sentence.
-pub(crate) fn sentence() -> String {
+pub fn sentence() -> String {
     counted(&rows().collect::<Vec<_>>())
 }
 
@@ -179,7 +179,7 @@ fn counted(rows: &[&Row]) -> String {
 }
 
 /// Every constant with its source, for a terminal.
-pub(crate) fn table() -> String {
+pub fn table() -> String {
     let mut text = format!("{}.\n", sentence());
     for (calibrated, title) in [(true, "Calibrated"), (false, "Uncalibrated: assumed, or from memory")] {
         let _ = write!(text, "\n{title}\n");
@@ -192,7 +192,7 @@ pub(crate) fn table() -> String {
 }
 
 /// Text at the end of `--help`.
-pub(crate) fn help() -> String {
+pub fn help() -> String {
     format!("--set list prints the ingredients of the models; --list-constants the physical constants: {}.", sentence())
 }
 
