@@ -21,6 +21,7 @@ pub use error::ModelError;
 pub use ingredients::{Effect, Element, Ingredients, Law, Relaxation, SolverDevice, Support};
 pub use ingredients::{Variant, of_quality, realistic, variants};
 
+/// The examples of the README compile.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -120,6 +120,7 @@ pub struct Brain {
     pub mixtures: Vec<Shares>,
 }
 
+/// The examples of the README compile.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

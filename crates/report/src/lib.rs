@@ -33,6 +33,7 @@ pub mod whole;
 
 pub use error::ReportError;
 
+/// The examples of the README compile.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

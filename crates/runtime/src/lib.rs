@@ -451,6 +451,7 @@ impl Outcome {
     }
 }
 
+/// The examples of the README compile.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

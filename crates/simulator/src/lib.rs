@@ -1,5 +1,5 @@
-//! Runs a simulation session from its flags to its files: threads, clocks, phases, warnings,
-//! scores, recording.
+//! Runs a simulation session from its flags to its files, with its pictures, start page and command
+//! line.
 //!
 //! # Practice
 //! [`Session::open`] reports every user error before anything is written; [`Session::run`] runs the
@@ -39,3 +39,8 @@ pub use trepan_patient::{Inputs, TissueSource};
 pub use trepan_report::summary::Summary;
 pub use trepan_runtime::Stages;
 pub use trepan_stages::Program;
+
+/// The examples of the README compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
