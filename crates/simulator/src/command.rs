@@ -26,9 +26,9 @@ use trepan_runtime::Quantiles;
 use trepan_volume::dicom::Series;
 use trepan_window::display;
 
-/// What is logged unless `RUST_LOG` says otherwise. The toolkit of windows warns of settings of the
-/// desktop that do not concern a user.
-const LOGGED: &str = "warn,winit=error,trepan_simulator=info";
+/// What is logged unless `RUST_LOG` says otherwise: `trepan` is how the name of each crate begins.
+/// The toolkit of windows warns of settings of the desktop that do not concern a user.
+const LOGGED: &str = "warn,winit=error,trepan=info";
 
 /// Runs a program and returns its exit code.
 ///
