@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 12] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
-    &["voxel-size", "budget", "window", "evidence", "stages"],
+    &["voxel-size", "budget", "window", "evidence", "stages", "rivals"],
     &["patient", "runtime"],
     &["models"],
     &["report"],

@@ -170,6 +170,7 @@ fn test() -> Result<()> {
         &["clippy", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet", "--", "--deny", "warnings"],
         &[],
     )?;
+    cargo(&["check", "--package", "trepan-models", "--no-default-features", "--quiet"], &[])?;
     tests()?;
     cargo(&["test", "--workspace", "--doc", "--quiet"], &[])?;
     documentation()

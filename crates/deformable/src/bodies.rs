@@ -29,8 +29,8 @@ use crate::{
     config::ConfigError,
     narrow::{Hits, NONE},
     phase::{BroadPhase, Indexed},
-    rivals::HashedGrid,
     scene::Scene,
+    search::HashedGrid,
     step::{check_mesh, usual_cell_mm},
     surface::{MovingSurface, distinct_rows},
 };

@@ -10,8 +10,10 @@ use trepan_geometry::{Aabb, Vec3};
 
 /// A closed box, mm; empty when a `low` exceeds its `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Extent {
+pub struct Extent {
+    /// The lowest corner.
     pub low: Vec3A,
+    /// The highest corner.
     pub high: Vec3A,
 }
 
@@ -31,6 +33,7 @@ impl Extent {
         extent
     }
 
+    /// Takes in a point.
     #[inline]
     pub fn grow(&mut self, p: Vec3) {
         let p = Vec3A::from(p);
@@ -43,12 +46,14 @@ impl Extent {
         (self.low, self.high) = (other.low.min(self.low), other.high.max(self.high));
     }
 
+    /// Whether two boxes meet; an empty one meets none.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
         let meet = self.low.cmple(other.high) & other.low.cmple(self.high);
         (meet & self.low.cmple(self.high) & other.low.cmple(other.high)).all()
     }
 
+    /// Whether a point lies inside.
     #[inline]
     pub fn contains(&self, p: Vec3) -> bool {
         let p = Vec3A::from(p);

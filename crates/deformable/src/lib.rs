@@ -11,8 +11,8 @@
 //! [`MeshCollision`] is for two meshes or one against itself, [`SlidingWall`] for tissue in a
 //! hollow. [`TissueCollision::step`] runs in the collision thread, once for each new state of the
 //! tissue; it allocates nothing, and what it found is one plain struct, [`TissueStep`]. Searches
-//! are described values, [`Method`]: [`search::walk`] is recommended, [`rivals`] has the others, an
-//! f64 oracle among them.
+//! are described values, [`Method`]: [`search::walk`] is recommended, [`search::brute`] is an f64
+//! oracle, `trepan-rivals` has the others.
 //!
 //! # When not to use it
 //! For cutting: connections of the mesh are fixed.
@@ -21,13 +21,13 @@ mod bodies;
 mod bounded;
 mod config;
 mod extent;
+pub mod kit;
 mod list;
 mod method;
 mod narrow;
 mod outcome;
 mod phase;
 mod response;
-pub mod rivals;
 mod scene;
 mod seam;
 pub mod search;

@@ -15,7 +15,7 @@ use glam::DVec3;
 use trepan_geometry::Vec3;
 
 /// No tetrahedron, no triangle.
-pub(crate) const NONE: u32 = u32::MAX;
+pub const NONE: u32 = u32::MAX;
 
 /// How far outside, in barycentric units, still counts as on the border.
 const BORDER: f64 = 1e-9;
@@ -46,7 +46,8 @@ type Framed = (u32, Option<Frame>);
 const FRAMES: usize = 16;
 
 impl Hits {
-    pub(crate) fn with_points(count: usize) -> Self {
+    /// Room for so many points.
+    pub fn with_points(count: usize) -> Self {
         Self {
             tet: vec![NONE; count],
             weights: vec![[0.0; 4]; count],
@@ -58,7 +59,8 @@ impl Hits {
         }
     }
 
-    pub(crate) fn clear(&mut self) {
+    /// Forgets all.
+    pub fn clear(&mut self) {
         self.tet.fill(NONE);
         (self.tests, self.skipped, self.overflow) = (0, 0, 0);
         self.frames = [(NONE, None); FRAMES];
@@ -67,7 +69,7 @@ impl Hits {
     /// Tests point `i` against a tetrahedron and keeps it when inside. Returns the coordinates for
     /// a walk.
     #[inline]
-    pub(crate) fn test(&mut self, scene: &Scene, i: usize, tet: u32) -> Option<[f64; 4]> {
+    pub fn test(&mut self, scene: &Scene, i: usize, tet: u32) -> Option<[f64; 4]> {
         self.tests += 1;
         let slot = &mut self.frames[tet as usize % FRAMES];
         if slot.0 != tet {
@@ -122,7 +124,7 @@ impl Frame {
 
 /// Whether a tetrahedron has positive, finite volume, by the same arithmetic as the exact test.
 #[inline]
-pub(crate) fn is_sound([a, b, c, d]: [Vec3; 4]) -> bool {
+pub fn is_sound([a, b, c, d]: [Vec3; 4]) -> bool {
     let origin = a.as_dvec3();
     is_volume((b.as_dvec3() - origin).dot((c.as_dvec3() - origin).cross(d.as_dvec3() - origin)))
 }
@@ -134,6 +136,6 @@ fn is_volume(volume: f64) -> bool {
 
 /// Whether a point with these coordinates lies inside or on the border.
 #[inline]
-pub(crate) fn is_inside(weights: &[f64; 4]) -> bool {
+pub fn is_inside(weights: &[f64; 4]) -> bool {
     weights[0].min(weights[1]).min(weights[2].min(weights[3])) >= -BORDER
 }

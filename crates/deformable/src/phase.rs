@@ -24,7 +24,7 @@ pub trait BroadPhase: Send {
 
 /// Box of a tetrahedron; empty when a corner is not finite.
 #[inline]
-pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
+pub fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
     let [a, b, c, d] = *tet;
     let [a, b, c, d] = [a, b, c, d].map(|node| Vec3A::from(positions[node as usize]));
     if !(a + b + c + d).is_finite() {
@@ -34,7 +34,7 @@ pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
 }
 
 /// The points of a step, sorted so that a box finds those inside it.
-pub(crate) trait PointIndex: Send {
+pub trait PointIndex: Send {
     /// Takes the points of a step; those that are not finite are left out.
     fn place(&mut self, points: &[Vec3]);
 
@@ -43,7 +43,7 @@ pub(crate) trait PointIndex: Send {
 }
 
 /// Fills `out`, up to its capacity, with the numbers of the finite points.
-pub(crate) fn list_finite(points: &[Vec3], out: &mut Vec<u32>) {
+pub fn list_finite(points: &[Vec3], out: &mut Vec<u32>) {
     out.clear();
     let finite = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite());
     out.extend(finite.take(out.capacity()));
@@ -65,19 +65,19 @@ impl<I> Indexed<I> {
     }
 
     /// Forgets the tetrahedra of the last step.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.boxes.clear();
     }
 
     /// Takes a tetrahedron when its box meets the region and there is room.
-    pub(crate) fn offer(&mut self, tet: u32, bounds: Extent, region: &Extent) {
+    pub fn offer(&mut self, tet: u32, bounds: Extent, region: &Extent) {
         if bounds.overlaps(region) {
             push_bounded(&mut self.boxes, (tet, bounds));
         }
     }
 
     /// Brings the tetrahedra into ascending order.
-    pub(crate) fn sort(&mut self) {
+    pub fn sort(&mut self) {
         self.boxes.sort_unstable_by_key(|(tet, _)| *tet);
     }
 }
@@ -102,7 +102,7 @@ impl<I: PointIndex> BroadPhase for Indexed<I> {
 }
 
 /// The search by an index of the points.
-pub(crate) fn indexed(inputs: &SearchInputs, index: impl PointIndex + 'static) -> Box<dyn Search> {
+pub fn indexed(inputs: &SearchInputs, index: impl PointIndex + 'static) -> Box<dyn Search> {
     Box::new(Phased::new(Indexed::new(index, inputs.mesh.tets.len()), inputs.points))
 }
 

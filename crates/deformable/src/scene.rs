@@ -22,18 +22,19 @@ pub struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    /// Corners of a tetrahedron, mm.
     #[inline]
-    pub(crate) fn corners(&self, tet: u32) -> [Vec3; 4] {
+    pub fn corners(&self, tet: u32) -> [Vec3; 4] {
         self.tets[tet as usize].map(|node| self.positions[node as usize])
     }
 
     /// Box of the ball.
-    pub(crate) fn ball_box(&self) -> Aabb {
+    pub fn ball_box(&self) -> Aabb {
         Aabb::of_sphere(self.tool.tip(), self.radius_mm)
     }
 
     /// Number of the last point, the centre.
-    pub(crate) fn centre(&self) -> usize {
+    pub fn centre(&self) -> usize {
         self.points.len() - 1
     }
 }

@@ -1,10 +1,10 @@
 //! One collision step, readable as a list: place the points, fit the surface, find, respond.
 
 use crate::config::{Config, ConfigError};
-use crate::list::responder;
 use crate::method::Response;
 use crate::narrow::{Hits, NONE};
 use crate::outcome::TissueStep;
+use crate::response::responder;
 use crate::response::{Foundation, Law, Respond, Spring};
 use crate::scene::Scene;
 use crate::seam::{Search, SearchInputs};

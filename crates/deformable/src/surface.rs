@@ -36,7 +36,7 @@ const LEAST_MOTION: f32 = 0.5;
 
 /// Closest point on the surface.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Foot {
+pub struct Foot {
     /// The triangle.
     pub triangle: u32,
     /// Weights of the point on its corners.
@@ -103,13 +103,13 @@ impl MovingSurface {
     }
 
     /// Forgets all boxes; the next step fits them all.
-    pub(crate) fn reset(&mut self) {
+    pub fn reset(&mut self) {
         (self.step, self.motion) = (0, LEAST_MOTION);
     }
 
     /// Begins a step: fits a slice of the boxes to the moved nodes, all of them in the first step,
     /// and those that meet `region`.
-    pub(crate) fn refit(&mut self, positions: &[Vec3], region: Extent) {
+    pub fn refit(&mut self, positions: &[Vec3], region: Extent) {
         if self.step == u32::MAX {
             self.reset();
         }
@@ -162,7 +162,7 @@ impl MovingSurface {
 
     /// Adds the triangles whose boxes meet `region` to `near`, up to its capacity; returns how many
     /// did not fit.
-    pub(crate) fn gather(&mut self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
+    pub fn gather(&mut self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
         let mut overflow = 0;
         let mut take = |t: u32| overflow += push_bounded(near, t);
         if self.region.holds(region) {
@@ -205,7 +205,7 @@ impl MovingSurface {
 
     /// The closest point of the whole surface; the nearest box first, then only boxes nearer than
     /// the best so far.
-    pub(crate) fn closest(&mut self, positions: &[Vec3], to: Vec3) -> Option<Foot> {
+    pub fn closest(&mut self, positions: &[Vec3], to: Vec3) -> Option<Foot> {
         let (mut first, mut nearest) = (None, f32::INFINITY);
         for cluster in 0..self.boxes.len() {
             let distance2 = self.loose(cluster).distance2(to);
@@ -258,19 +258,20 @@ impl MovingSurface {
     }
 
     /// The nodes around a foot, with their weights.
-    pub(crate) fn weights_at(&self, foot: &Foot) -> [(u32, f32); 3] {
+    pub fn weights_at(&self, foot: &Foot) -> [(u32, f32); 3] {
         let nodes = self.triangles[foot.triangle as usize];
         core::array::from_fn(|c| (nodes[c], foot.weights[c]))
     }
 
     /// Unit normal of the flat triangle, outwards; zero when it has no area.
-    pub(crate) fn flat_normal(&self, positions: &[Vec3], t: u32) -> Vec3 {
+    pub fn flat_normal(&self, positions: &[Vec3], t: u32) -> Vec3 {
         let [a, b, c] = self.corners(positions, t);
         (b - a).cross(c - a).normalize_or_zero()
     }
 
+    /// Corners of a border triangle, mm.
     #[inline]
-    pub(crate) fn corners(&self, positions: &[Vec3], t: u32) -> [Vec3; 3] {
+    pub fn corners(&self, positions: &[Vec3], t: u32) -> [Vec3; 3] {
         let [a, b, c] = self.triangles[t as usize];
         [positions[a as usize], positions[b as usize], positions[c as usize]]
     }
@@ -342,7 +343,7 @@ fn spread_bits(x: u32) -> u32 {
 }
 
 /// Rows of numbers, each sorted and without repetition.
-pub(crate) fn distinct_rows(rows: impl Iterator<Item = impl Iterator<Item = u32>>) -> Csr {
+pub fn distinct_rows(rows: impl Iterator<Item = impl Iterator<Item = u32>>) -> Csr {
     let mut csr = Csr { starts: vec![0], items: Vec::new() };
     for row in rows {
         let mut row: Vec<u32> = row.collect();

@@ -15,6 +15,7 @@
 mod error;
 pub mod ingredients;
 pub mod measure;
+pub mod methods;
 pub mod solver;
 
 pub use error::ModelError;

@@ -8,6 +8,7 @@
 use crate::ModelError;
 use crate::ingredients::{Element, Ingredients, Relaxation, SolverDevice};
 use crate::measure::tissue::MASS_ADDED;
+use crate::methods;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_budget::Tissue;
@@ -77,7 +78,7 @@ fn on_any(
     tissue: &Tissue,
     ingredients: &Ingredients,
 ) -> Result<(Box<dyn SoftSolver>, SolverInfo), ModelError> {
-    if let Some(method) = trepan_soft::Method::named(tissue.solver) {
+    if let Some(method) = methods::solver(tissue.solver) {
         return Ok((method.build(body).map_err(refused)?, SolverInfo::here(method.name())));
     }
     let config = ingredients.config();

@@ -90,7 +90,8 @@ struct Bite {
 
 /// A voxel that is worn by density.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct WornVoxel {
+pub struct WornVoxel {
+    /// The voxel.
     pub voxel: IVec3,
     /// Its share of the wear, in any unit.
     pub share: f32,

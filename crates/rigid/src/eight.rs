@@ -6,23 +6,29 @@ use wide::f32x8;
 
 /// Eight vectors.
 #[derive(Clone, Copy)]
-pub(crate) struct Vec3x8 {
+pub struct Vec3x8 {
+    /// First coordinates.
     pub x: f32x8,
+    /// Second coordinates.
     pub y: f32x8,
+    /// Third coordinates.
     pub z: f32x8,
 }
 
 impl Vec3x8 {
+    /// Eight vectors, lane by lane.
     #[inline]
     pub fn new(all: [Vec3; 8]) -> Self {
         Self { x: all.map(|v| v.x).into(), y: all.map(|v| v.y).into(), z: all.map(|v| v.z).into() }
     }
 
+    /// Scalar products.
     #[inline]
     pub fn dot(self, other: Self) -> f32x8 {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
+    /// Vector products.
     #[inline]
     pub fn cross(self, other: Self) -> Self {
         Self {
@@ -32,6 +38,7 @@ impl Vec3x8 {
         }
     }
 
+    /// Lengths.
     #[inline]
     pub fn length(self) -> f32x8 {
         self.dot(self).sqrt()
@@ -43,6 +50,7 @@ impl Vec3x8 {
         Self { x: which.select(self.x, other.x), y: which.select(self.y, other.y), z: which.select(self.z, other.z) }
     }
 
+    /// The vector of a lane.
     #[inline]
     pub fn lane(&self, lane: usize) -> Vec3 {
         Vec3::new(self.x.as_array()[lane], self.y.as_array()[lane], self.z.as_array()[lane])

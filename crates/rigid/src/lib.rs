@@ -11,9 +11,10 @@
 //! ```
 //!
 //! # Practice
-//! [`Method::RECOMMENDED`] is [`god_object_sphere`]; [`rivals`] has the others, and [`Method::all`]
-//! lists all. A step does not allocate, lock or wait; the same bone and path give the
-//! same bytes. The step is the one writer of the [`BoneVolume`](trepan_bone::BoneVolume).
+//! [`Method::RECOMMENDED`] is [`god_object_sphere`], [`brute`] its oracle; `trepan-rivals` has
+//! other methods, [`frame`] the parts to write one. A step does not allocate, lock or wait; the
+//! same bone and path give the same bytes. The step is the one writer of the
+//! [`BoneVolume`](trepan_bone::BoneVolume).
 //!
 //! ```
 //! use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -39,19 +40,22 @@
 //!
 //! # When not to use it
 //! For soft tissue, or for bones that move: the bone is fixed in the world. Tools that are not
-//! round at the tip have [`mesh_shell`](rivals::mesh_shell) and a penalty method only.
+//! round at the tip have `mesh_shell` of `trepan-rivals` and a penalty method only.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 mod readme {}
 
 mod ball;
+pub mod brute;
 mod burr;
+mod cell;
 mod chain;
 mod cut_ball;
 mod cut_discs;
 mod disc;
 mod eight;
+pub mod frame;
 pub mod god_object_sphere;
 mod half_spaces;
 mod lean;
@@ -60,7 +64,6 @@ mod local_surface;
 mod method;
 mod nodes;
 pub mod removal;
-pub mod rivals;
 mod rows;
 mod seam;
 mod shaft;

@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! A method is one file with a [`RigidContact`] and a [`Descriptor`]. `Method::of` makes it usable
-//! from any crate (`tests/toy_method.rs`); a `mod` line and its name in `list.rs` bring it to the
+//! from any crate (`tests/toy_method.rs`); its name in a list of `trepan-rivals` brings it to the
 //! command lines, suites and charts.
 
 use crate::chain::Chain;

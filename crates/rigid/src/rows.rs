@@ -13,8 +13,10 @@ use trepan_geometry::Vec3;
 
 /// A ball in grid coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct GridBall {
+pub struct GridBall {
+    /// Its centre.
     pub centre: Vec3,
+    /// Its radius; a negative one has no voxel.
     pub radius: f32,
 }
 
@@ -31,7 +33,7 @@ impl GridBall {
 }
 
 /// Calls `visit` with the first voxel and the last x of every row of `ball` without `hole`.
-pub(crate) fn rows(ball: GridBall, hole: GridBall, mut visit: impl FnMut(IVec3, i32)) {
+pub fn rows(ball: GridBall, hole: GridBall, mut visit: impl FnMut(IVec3, i32)) {
     let (low, high) = ((ball.centre - ball.radius).ceil().as_ivec3(), (ball.centre + ball.radius).floor().as_ivec3());
     for k in low.z..=high.z {
         for j in low.y..=high.y {
@@ -52,7 +54,7 @@ pub(crate) fn rows(ball: GridBall, hole: GridBall, mut visit: impl FnMut(IVec3, 
 
 /// Calls `visit` with each voxel of a box from `start` to before `end`, x fastest.
 #[inline]
-pub(crate) fn each(start: IVec3, end: IVec3, mut visit: impl FnMut(IVec3)) {
+pub fn each(start: IVec3, end: IVec3, mut visit: impl FnMut(IVec3)) {
     for k in start.z..end.z {
         for j in start.y..end.y {
             (start.x..end.x).for_each(|i| visit(IVec3::new(i, j, k)));

@@ -24,7 +24,7 @@ const SLICE: f32 = 8.0;
 
 /// A straight shaft in grid coordinates.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Shaft {
+pub struct Shaft {
     /// A point of the axis.
     pub start: Vec3,
     /// Unit vector along the axis.

@@ -40,7 +40,7 @@ const TURNS: u32 = 4;
 const CACHE: usize = 4096;
 
 /// The ways from a voxel to those that share a face with it.
-pub(crate) const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
+pub const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
 
 /// The discs near a point, gathered anew for each place of the tool.
 #[derive(Default)]

@@ -290,7 +290,7 @@ impl Window {
 
 /// Eight values as floats.
 #[inline]
-pub(crate) fn wide(values: &[i16; 8]) -> f32x8 {
+pub fn wide(values: &[i16; 8]) -> f32x8 {
     f32x8::from_i32x8(i32x8::from_i16x8(i16x8::new(*values)))
 }
 

@@ -196,22 +196,3 @@ fn a_stroke_changes_only_nodes_near_the_burr() {
         assert!(before.iter().any(|value| *value > 0));
     }
 }
-
-#[test]
-fn what_rivals_wear_off_by_voxels_is_what_their_load_earns() {
-    for method in ["exposed-faces", "voxel-sum"].map(|name| Method::named(name).expect("a method")) {
-        let bone = bone([36, 36, 36], 0.5, |p| p.z);
-        let mut contact = method.build(&Tool::burr(3.0));
-        contact.reset(Pose::from_translation(Vec3::Z * 3.0));
-        let (mut out, mut removed, mut earned, mut height) = (RigidStep::default(), 0.0, 0.0, 3.0);
-        for _ in 0..4000 {
-            contact.step(&bone, &at(Vec3::Z * height), true, 1.0, &mut out);
-            // A hand that presses with 1.2 N.
-            height += (2.0 * out.manifold.depth_mm * out.manifold.normal.z - 1.2) / 20.0;
-            earned += RemovalLaw::RATE.volume_mm3(&pressed_at(3.0, out.manifold.depth_mm, 1.0));
-            removed += out.removed_mm3;
-        }
-        println!("{}: {removed} of {earned} mm³", method.name());
-        assert!(earned > 5.0 && (removed / earned - 1.0).abs() < 0.25, "{}: {removed} of {earned}", method.name());
-    }
-}

@@ -3,7 +3,7 @@
 mod common;
 use common::{at, bone, directions};
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_rigid::rivals::brute;
+use trepan_rigid::brute;
 use trepan_rigid::{Method, RigidStep};
 
 const RADIUS_MM: f32 = 3.0;

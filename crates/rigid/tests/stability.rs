@@ -3,7 +3,7 @@
 mod common;
 use common::{at, bone, scanned};
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_rigid::rivals::brute;
+use trepan_rigid::brute;
 use trepan_rigid::{Method, RigidStep};
 
 /// Whether a ball driven through a wall of `voxels` thickness at `mm_per_tick`, `degrees` off its

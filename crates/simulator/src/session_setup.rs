@@ -12,6 +12,7 @@ use trepan_link::Recording;
 use trepan_measurements::support;
 use trepan_mesh::TetMesh;
 use trepan_models::ingredients::{Ingredients, Support};
+use trepan_models::methods;
 use trepan_models::solver::{self, SolverInfo};
 use trepan_patient::Case;
 use trepan_patient::Plan;
@@ -157,12 +158,12 @@ impl SessionSetup {
     fn rigid(&self) -> Result<Method, SessionError> {
         let Bone { method, points, .. } = self.models.setup.bone;
         let unknown = || SessionError::Internal(format!("no method {method} of contact with bone"));
-        Ok(Method::named(method).ok_or_else(unknown)?.with_points(points))
+        Ok(methods::bone_contact(method).ok_or_else(unknown)?.with_points(points))
     }
 
     /// Whether the brain is held by its anchors in a skull: rival solvers have none.
     fn is_anchored(&self) -> bool {
-        let is_rival = trepan_soft::Method::named(self.models.setup.tissue.solver).is_some();
+        let is_rival = methods::solver(self.models.setup.tissue.solver).is_some();
         self.bone().is_some() && self.models.ingredients().support == Support::Anchored && !is_rival
     }
 

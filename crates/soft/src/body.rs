@@ -18,8 +18,8 @@ pub struct Body {
     pub material_of_tet: Vec<u8>,
     /// Springs to places at rest, at most one a node; the last one of a node counts.
     pub anchors: Vec<Anchor>,
-    /// Membrane on the surface. [`trepan-tled`](https://docs.rs/trepan-tled) has it, the rivals
-    /// here have not.
+    /// Membrane on the surface. [`trepan-tled`](https://docs.rs/trepan-tled) has it, other
+    /// solvers have not.
     pub membrane: Membrane,
 }
 

@@ -100,7 +100,7 @@ pub(crate) fn volumetric(j: f64, VolumeWall { below, steepening }: VolumeWall) -
 }
 
 /// Cofactor matrix, the gradient of the determinant: `cof F = J F⁻ᵀ`, defined for singular F too.
-pub(crate) fn cofactor(f: DMat3) -> DMat3 {
+pub fn cofactor(f: DMat3) -> DMat3 {
     DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
 }
 

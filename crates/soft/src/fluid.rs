@@ -15,7 +15,7 @@
 //! p is the pressure inside the wall less that outside, A the node's area in an opening.
 //!
 //! # Practice
-//! [`trepan-tled`](https://docs.rs/trepan-tled) takes both; the rivals here know gravity alone.
+//! [`trepan-tled`](https://docs.rs/trepan-tled) takes both; other solvers know gravity alone.
 
 use trepan_geometry::Vec3;
 

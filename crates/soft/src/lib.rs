@@ -1,5 +1,4 @@
-//! Soft tissue: the seam that every solver sits behind, materials, rival solvers and an f64
-//! implicit reference.
+//! Soft tissue: the seam that every solver sits behind, materials and an f64 implicit reference.
 //!
 //! # Theory
 //! A body is a mesh of 4-node tetrahedra with lumped masses. With nodal positions `x = X + u` every
@@ -8,16 +7,17 @@
 //!
 //! # Practice
 //! Units mm, ms, g: stiffness in MPa, forces in N, densities in g/mm³. [`SoftSolver`] is the seam,
-//! [`Method`] the list of solvers in this crate; the fast explicit solver lives in `trepan-tled`
-//! behind the same seam. Nothing here does I/O, reads a clock or starts a thread.
+//! [`Method`] a solver as a value; the fast explicit solver lives in `trepan-tled` behind the same
+//! seam, others to compare it with in `trepan-rivals`. Nothing here does I/O, reads a clock or
+//! starts a thread.
 //!
 //! ```
-//! use trepan_soft::{Body, Loads, Material, Method, boxes};
+//! use trepan_soft::{Body, Loads, Material, Method, boxes, reference};
 //!
 //! let mesh = boxes::split_box([2, 2, 2], trepan_geometry::Vec3::splat(20.0));
 //! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
 //! let body = Body::uniform(mesh, fixed, Material::BRAIN);
-//! let mut solver = Method::named("reference").unwrap().build(&body)?;
+//! let mut solver = Method::of(&reference::METHOD).build(&body)?;
 //! let gravity = trepan_geometry::Vec3::new(0.0, 0.0, -9.81e-3);
 //! let report = solver.step(&Loads { gravity, ..Loads::default() }, 1.0);
 //! assert_eq!(report.inverted, 0);
@@ -39,7 +39,7 @@ mod method;
 mod mixture;
 mod operator;
 mod pressure;
-pub mod rivals;
+pub mod reference;
 pub mod simd;
 mod solver;
 mod stiffening;
@@ -52,14 +52,14 @@ pub use bound::{
     power_bound_of_ms,
 };
 pub use contact::{FreeNode, Gain, ImplicitSprings};
-pub use energy::{FADE_BELOW, NeoHookean, VolumeWall};
+pub use energy::{FADE_BELOW, NeoHookean, VolumeWall, cofactor};
 pub use fluid::{Anchor, Fluid, LEVEL_BAND_MM};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};
 pub use membrane::{Membrane, TriangleShape};
 pub use method::{Descriptor, Method};
 pub use mixture::Bound;
-pub use operator::Stiffness;
+pub use operator::{Hooke, Stiffness};
 pub use pressure::SurfacePressure;
 pub use solver::{Loads, MakeSolver, NodeState, SoftSolver, StepReport};
 pub use stiffening::{STIFFENING_POWER, Stiffening};

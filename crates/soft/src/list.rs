@@ -1,20 +1,9 @@
 //! The solvers of this crate.
 
-use crate::method::{Descriptor, Method};
-use crate::rivals::{corotational, linear, mass_spring, reference, xpbd};
-
-/// All of them, in the order of charts.
-const METHODS: &[Descriptor] =
-    &[linear::METHOD, mass_spring::METHOD, corotational::METHOD, xpbd::METHOD, reference::METHOD];
+use crate::method::Method;
+use crate::reference;
 
 impl Method {
-    /// Every method with its default settings.
-    pub fn all() -> Vec<Self> {
-        METHODS.iter().map(Self::of).collect()
-    }
-
-    /// The method of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        METHODS.iter().find(|descriptor| descriptor.name == name).map(Self::of)
-    }
+    /// The solver of this crate, the static oracle; `trepan-rivals` has others.
+    pub const OWN: [Self; 1] = [Self::of(&reference::METHOD)];
 }

@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! A solver is one file with a [`SoftSolver`] and a [`Descriptor`]. `Method::of` makes it usable
-//! from any crate (`tests/toy_solver.rs`); a `mod` line and its name in `list.rs` bring it to the
+//! from any crate (`tests/toy_solver.rs`); its name in a list of `trepan-rivals` brings it to the
 //! command lines, suites and charts.
 
 use crate::body::{Body, BodyError};

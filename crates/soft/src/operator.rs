@@ -22,12 +22,15 @@ pub struct Stiffness {
 
 /// Small-strain elasticity.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Hooke {
+pub struct Hooke {
+    /// First Lamé parameter, MPa.
     pub lambda: f64,
+    /// Shear modulus, MPa.
     pub mu: f64,
 }
 
 impl Hooke {
+    /// Parameters of a material.
     pub fn of(material: &Material) -> Self {
         let (mu, kappa) = (material.shear_mpa(), material.bulk_mpa());
         Self { lambda: kappa - mu * 2.0 / 3.0, mu }

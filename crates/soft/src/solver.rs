@@ -87,7 +87,7 @@ pub struct Loads {
     pub gravity: Vec3,
     /// Springs on the tissue (tool, walls, folds), evaluated with the solver's own positions.
     pub contacts: NodalContacts,
-    /// Fluid around the body, with its level; TLED takes it, the rivals of this crate do not.
+    /// Fluid around the body, with its level; TLED takes it, others do not.
     pub fluid: Fluid,
 }
 

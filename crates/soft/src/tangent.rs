@@ -244,7 +244,7 @@ fn groups(elements: &[Element], bulk_groups: &[u8]) -> Vec<Group> {
 }
 
 /// Nodes below `count` of a spring, with their weights.
-fn known(contact: &NodalContact, count: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+pub(crate) fn known(contact: &NodalContact, count: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
     contact.nodes().map(|(n, w)| (n as usize, f64::from(w))).filter(move |(n, _)| *n < count)
 }
 

@@ -45,7 +45,7 @@ fn a_solver_of_one_file_is_built_and_steps() {
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
     let body = Body::uniform(mesh, fixed.clone(), Material::BRAIN);
     let toy = Method::of(&TOY);
-    assert!(toy.name() == "toy" && !Method::all().contains(&toy));
+    assert!(toy.name() == "toy" && toy != Method::of(&trepan_soft::reference::METHOD));
     let mut solver = toy.build(&body).unwrap();
     let loads = Loads { gravity: Vec3::NEG_Z, contacts: NodalContacts::none(), ..Loads::default() };
     solver.step(&loads, 1.0);

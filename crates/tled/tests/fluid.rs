@@ -2,7 +2,7 @@
 
 use trepan_contact::{NodalContact, NodalContacts};
 use trepan_geometry::Vec3;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Anchor, Body, Fluid, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Settling, Tled};
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_mesh::Surface;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, SurfacePressure, boxes};
 use trepan_tled::{Config, Settling, Tled};
 

@@ -3,7 +3,7 @@
 
 use glam::{Quat, Vec3};
 use trepan_contact::NodalContact;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, NeoHookean, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Tled};
 

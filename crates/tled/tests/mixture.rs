@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 

@@ -3,7 +3,7 @@
 use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::Surface;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Anchor, Body, Fluid, Loads, Material, Membrane, SoftSolver, SurfacePressure, boxes};
 use trepan_tled::{Config, Relaxation, Settling, Tled};
 

@@ -3,14 +3,25 @@
 mod ball;
 mod foundation;
 mod near;
+mod printed;
 mod rod;
 
 pub(crate) use ball::Ball;
 pub(crate) use foundation::{Foundation, Law};
 
-use crate::{narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
+use crate::{method::Response, narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
+use printed::Faces;
 use trepan_contact::{NodalContact, SurfacePatch};
 use trepan_geometry::Vec3;
+
+/// Makes a response.
+pub(crate) fn responder(response: Response) -> Box<dyn Respond> {
+    match response {
+        Response::Ball => Box::new(Ball::new()),
+        Response::Printed => Box::new(Faces { nearest: false }),
+        Response::NearestFace => Box::new(Faces { nearest: true }),
+    }
+}
 
 /// A response with its memory.
 pub(crate) trait Respond: Send {

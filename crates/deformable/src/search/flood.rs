@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Tetrahedra to look at, and those seen in this flood.
-pub(crate) struct Flood {
+pub struct Flood {
     open: Vec<u32>,
     seen_at: Vec<u32>,
     number: u32,
@@ -20,12 +20,13 @@ pub(crate) struct Flood {
 const MAX_OPEN: usize = 16_384;
 
 impl Flood {
-    pub(crate) fn over(tets: usize) -> Self {
+    /// Room for a mesh of so many tetrahedra.
+    pub fn over(tets: usize) -> Self {
         Self { open: Vec::with_capacity(MAX_OPEN.min(4 * tets)), seen_at: vec![0; tets], number: 0 }
     }
 
     /// Forgets what was seen.
-    pub(crate) fn begin(&mut self) {
+    pub fn begin(&mut self) {
         self.open.clear();
         self.number = self.number.wrapping_add(1);
         if self.number == 0 {
@@ -35,7 +36,7 @@ impl Flood {
     }
 
     /// Adds a tetrahedron to begin from; counts one that does not fit.
-    pub(crate) fn reach(&mut self, tet: u32, hits: &mut Hits) {
+    pub fn reach(&mut self, tet: u32, hits: &mut Hits) {
         if self.seen_at[tet as usize] == self.number {
             return;
         }
@@ -46,7 +47,7 @@ impl Flood {
     }
 
     /// Spreads over all tetrahedra that meet `region`, until no point is lost any more.
-    pub(crate) fn run(&mut self, scene: &Scene, region: &Extent, lost: &mut Lost, hits: &mut Hits) {
+    pub fn run(&mut self, scene: &Scene, region: &Extent, lost: &mut Lost, hits: &mut Hits) {
         while let Some(tet) = self.open.pop().filter(|_| !lost.is_empty()) {
             let bounds = passage(scene, tet);
             if !bounds.overlaps(region) {
@@ -72,7 +73,7 @@ impl Flood {
 
 /// Box that a flood passes through: one with a NaN corner is passed always, since its place is
 /// unknown.
-pub(crate) fn passage(scene: &Scene, tet: u32) -> Extent {
+pub fn passage(scene: &Scene, tet: u32) -> Extent {
     let bounds = box_of(scene.positions, &scene.tets[tet as usize]);
     if bounds == Extent::EMPTY { Extent::EVERYWHERE } else { bounds }
 }

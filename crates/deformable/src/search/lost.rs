@@ -5,7 +5,7 @@ use crate::extent::Extent;
 use trepan_geometry::Vec3;
 
 /// Numbers and places of lost points.
-pub(crate) struct Lost {
+pub struct Lost {
     numbers: Vec<u32>,
     /// x, y and z of each.
     axes: [Vec<f32>; 3],
@@ -15,52 +15,59 @@ pub(crate) struct Lost {
 const LANES: usize = 8;
 
 impl Lost {
-    pub(crate) fn with_capacity(points: usize) -> Self {
+    /// Room for so many points.
+    pub fn with_capacity(points: usize) -> Self {
         let axes = core::array::from_fn(|_| Vec::with_capacity(points));
         Self { numbers: Vec::with_capacity(points), axes }
     }
 
-    pub(crate) fn clear(&mut self) {
+    /// Forgets all.
+    pub fn clear(&mut self) {
         self.numbers.clear();
         self.axes.iter_mut().for_each(Vec::clear);
     }
 
-    pub(crate) fn push(&mut self, number: u32, p: Vec3) {
+    /// Adds a point with its number.
+    pub fn push(&mut self, number: u32, p: Vec3) {
         self.numbers.push(number);
         self.axes.iter_mut().zip(p.to_array()).for_each(|(axis, x)| axis.push(x));
     }
 
     /// Takes the `k`th away; the last one takes its place.
-    pub(crate) fn swap_remove(&mut self, k: usize) {
+    pub fn swap_remove(&mut self, k: usize) {
         self.numbers.swap_remove(k);
         self.axes.iter_mut().for_each(|axis| _ = axis.swap_remove(k));
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    /// Whether no point is lost.
+    pub fn is_empty(&self) -> bool {
         self.numbers.is_empty()
     }
 
-    pub(crate) fn len(&self) -> usize {
+    /// Number of lost points.
+    pub fn len(&self) -> usize {
         self.numbers.len()
     }
 
-    pub(crate) fn number(&self, k: usize) -> u32 {
+    /// Number of the lost point at `k`.
+    pub fn number(&self, k: usize) -> u32 {
         self.numbers[k]
     }
 
-    pub(crate) fn place(&self, k: usize) -> Vec3 {
+    /// Place of the lost point at `k`, world mm.
+    pub fn place(&self, k: usize) -> Vec3 {
         self.axes.each_ref().map(|axis| axis[k]).into()
     }
 
     /// Box of all.
-    pub(crate) fn bounds(&self) -> Extent {
+    pub fn bounds(&self) -> Extent {
         let ranges = self.axes.each_ref().map(|axis| range(axis));
         Extent { low: ranges.map(|r| r.0).into(), high: ranges.map(|r| r.1).into() }
     }
 
     /// The first one from the `k`th on that lies in a box.
     #[inline]
-    pub(crate) fn next_in(&self, mut k: usize, b: &Extent) -> Option<usize> {
+    pub fn next_in(&self, mut k: usize, b: &Extent) -> Option<usize> {
         let [x, y, z] = self.axes.each_ref().map(|axis| &axis[..self.numbers.len()]);
         let (low, high) = (b.low.to_array(), b.high.to_array());
         let inside = |n: usize| {

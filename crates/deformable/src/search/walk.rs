@@ -195,7 +195,7 @@ fn shortest_ray(lost: &Lost, all: &Extent) -> (usize, Extent) {
 const BEYOND_MM: f32 = 1.0;
 
 /// Walks point `i` from `tet`; says whether it arrived.
-pub(crate) fn walk(scene: &Scene, i: usize, mut tet: u32, hits: &mut Hits) -> bool {
+pub fn walk(scene: &Scene, i: usize, mut tet: u32, hits: &mut Hits) -> bool {
     for _ in 0..MAX_STEPS {
         let Some(weights) = hits.test(scene, i, tet) else { return false };
         if is_inside(&weights) {

@@ -1,6 +1,7 @@
 //! The table of keys that `--set` takes, and what derives from it: parsing, lists, the user guide.
 
 use super::{Element, Ingredients, Law, Relaxation, SolverDevice, Support};
+use crate::methods;
 use clap::ValueEnum;
 use trepan_budget::Quality;
 use trepan_measurements::brain_membranes;
@@ -62,16 +63,16 @@ pub enum Part {
 pub const KEYS: &[Key] = &[
     Key {
         name: "rigid",
-        values: || list(trepan_rigid::Method::all().iter().map(|method| method.name())),
+        values: || list(methods::bone_contacts().iter().map(|method| method.name())),
         about: "method of contact with bone; as `--rigid`",
         compared: || {
             let usual = [god_object_sphere::METHOD.name, god_object_sphere::WITH_SHAFT.name];
-            let rivals = trepan_rigid::Method::all().into_iter().filter(|method| !usual.contains(&method.name()));
+            let rivals = methods::bone_contacts().into_iter().filter(|method| !usual.contains(&method.name()));
             rivals.filter(|method| !method.descriptor().is_oracle).map(|method| method.name().into()).collect()
         },
         get: |i| i.rigid.map(String::from),
         set: |i, text| {
-            i.rigid = Some(trepan_rigid::Method::named(text)?.name());
+            i.rigid = Some(methods::bone_contact(text)?.name());
             i.rigid_points = Some(0);
             Some(())
         },
@@ -133,14 +134,14 @@ pub const KEYS: &[Key] = &[
     Key {
         name: "solver",
         values: || {
-            let rivals = trepan_soft::Method::all();
+            let rivals = methods::solvers();
             list([TLED, FASTEST].into_iter().chain(rivals.iter().map(|method| method.name())))
         },
         about: "solver of the tissue; as `--solver`. `fastest` is `tled` with `device=fastest`",
-        compared: || trepan_soft::Method::all().iter().map(|method| method.name().into()).collect(),
+        compared: || methods::solvers().iter().map(|method| method.name().into()).collect(),
         get: |i| i.solver.map(String::from),
         set: |i, text| {
-            let rival = trepan_soft::Method::named(text).map(|method| method.name());
+            let rival = methods::solver(text).map(|method| method.name());
             i.solver = Some(rival.or([TLED, FASTEST].contains(&text).then_some(TLED))?);
             i.device = if text == FASTEST { SolverDevice::Fastest } else { i.device };
             Some(())
@@ -462,12 +463,12 @@ fn shaft(i: &mut Ingredients, text: &str) -> Option<()> {
 
 /// Whether a method of contact with bone feels the shaft.
 pub(crate) fn has_shaft(rigid: &str) -> bool {
-    trepan_rigid::Method::named(rigid).is_some_and(|method| method.descriptor().extent == Extent::BallAndShaft)
+    methods::bone_contact(rigid).is_some_and(|method| method.descriptor().extent == Extent::BallAndShaft)
 }
 
 /// Searches that a session can step.
 fn searches() -> impl Iterator<Item = trepan_deformable::Method> {
-    trepan_deformable::Method::all().into_iter().filter(|method| !method.descriptor().is_oracle)
+    methods::searches().into_iter().filter(|method| !method.descriptor().is_oracle)
 }
 
 /// A search that finds every point, with the same response, finds the same depth; others do not.
@@ -477,7 +478,11 @@ fn effect_of_search(name: &str) -> Effect {
         let of = method.descriptor();
         of.is_complete && of.response == usual
     };
-    if trepan_deformable::Method::named(name).is_some_and(is_same) { Effect::Rounding } else { Effect::Model }
+    if methods::searches().into_iter().find(|method| method.name() == name).is_some_and(is_same) {
+        Effect::Rounding
+    } else {
+        Effect::Model
+    }
 }
 
 /// Sets the law of all classes but the ventricles, which stand for fluid; with `CLASS:LAW` of one.

@@ -13,6 +13,7 @@
 //! # When not to use it
 //! To judge the CT itself: what the scanner has blurred is unknown.
 
+use crate::methods;
 use glam::{DAffine3, DVec3};
 use trepan_bone::BoneVolume;
 use trepan_budget::{Bone, Scene};
@@ -40,7 +41,7 @@ const ROOM_MM: f32 = 18.0;
 
 /// All choices: every real-time method on every voxel size.
 pub fn choices() -> Vec<Bone> {
-    let methods = Method::all().into_iter().filter(|m| !m.descriptor().is_oracle).map(|m| m.name());
+    let methods = methods::bone_contacts().into_iter().filter(|m| !m.descriptor().is_oracle).map(|m| m.name());
     let with = |method: &'static str| match method {
         "thesis" => POINTS.to_vec(),
         _ => vec![0],
@@ -51,7 +52,7 @@ pub fn choices() -> Vec<Bone> {
 
 /// Method of a choice; `None` for an unknown name.
 fn method(bone: &Bone) -> Option<Method> {
-    Method::named(bone.method).map(|method| method.with_points(bone.points))
+    methods::bone_contact(bone.method).map(|method| method.with_points(bone.points))
 }
 
 /// Measured error and time of a choice.

@@ -18,8 +18,8 @@
 //! solvers is a ratio of times in one run.
 
 use super::bone::Slide;
-use crate::ModelError;
 use crate::ingredients::{DYNAMIC_MASS_SCALING, Element};
+use crate::{ModelError, methods};
 use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::TriMesh;
 use trepan_budget::{Scene, Tissue, TissueForce, dt_ms};
@@ -29,7 +29,7 @@ use trepan_geometry::{Pose, Tool, ToolState, Twist, Vec3, quantile};
 use trepan_mesh::{Surface, TetMesh, lattice};
 use trepan_patient::Fineness;
 use trepan_patient::progress::Stopwatch;
-use trepan_soft::{Body, Loads, Material, Method, SoftSolver};
+use trepan_soft::{Body, Loads, Material, SoftSolver};
 use trepan_tled::{Config, Damping, Tled};
 use trepan_volume::{DistanceField, VoxelVolume};
 
@@ -63,7 +63,7 @@ const FIXED_SHARE: f32 = 0.35;
 pub fn choices() -> Vec<Tissue> {
     let choice = |solver, tets| Tissue { solver, tets, halvings: 0 };
     let refined = REFINED_TETS.map(|tets| Tissue { halvings: HALVINGS, ..choice("tled", tets) });
-    let names = Method::all().into_iter().filter(|m| !m.descriptor().is_static).map(|m| m.name());
+    let names = methods::solvers().into_iter().filter(|m| !m.descriptor().is_static).map(|m| m.name());
     let rivals = names.map(|solver| choice(solver, RIVALS_TETS));
     let tled = TETS.map(|tets| choice("tled", tets)).into_iter();
     tled.chain(refined).chain(rivals).collect()
@@ -149,7 +149,7 @@ impl<'a> Brains<'a> {
     /// Creates the solver of a choice; also returns its cost in a session over that without
     /// averaged accelerations.
     fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<(Box<dyn SoftSolver>, f64), ModelError> {
-        if let Some(method) = Method::named(choice.solver) {
+        if let Some(method) = methods::solver(choice.solver) {
             return Ok((method.build(&self.body(mesh)).map_err(brain_error)?, 1.0));
         }
         let tled = self.tled(mesh, self.element == Element::LockingFree, true)?;

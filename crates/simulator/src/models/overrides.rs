@@ -6,6 +6,7 @@ use crate::options::Patient;
 use trepan_budget::{Bone, Picture, Tissue};
 use trepan_models::ingredients::{Ingredients, KEYS, KeyValue, Part};
 use trepan_models::measure::Parts;
+use trepan_models::methods;
 
 /// Given parameters of each part, and `words` that describe them.
 #[derive(Clone, Debug)]
@@ -55,7 +56,7 @@ impl Overrides {
     /// Sets ingredients of `tled` that a quality chose, not a user, to their default for another
     /// solver.
     fn leave_out_what_a_rival_lacks(&mut self) {
-        let Some(_) = self.ingredients.solver.and_then(trepan_soft::Method::named) else { return };
+        let Some(_) = self.ingredients.solver.and_then(methods::solver) else { return };
         let of_tled = KEYS.iter().filter(|key| key.part == Part::Tled);
         for (key, usual) in of_tled.filter_map(|key| Some((key, key.usual?))) {
             let set = key.set(&mut self.ingredients, usual);
@@ -65,7 +66,7 @@ impl Overrides {
 
     /// Refuses an ingredient of `tled` for another solver.
     fn check(&self, given: &[KeyValue]) -> Result<(), SessionError> {
-        let Some(rival) = self.ingredients.solver.and_then(trepan_soft::Method::named) else { return Ok(()) };
+        let Some(rival) = self.ingredients.solver.and_then(methods::solver) else { return Ok(()) };
         let plain = Ingredients::default();
         let differs = |given: &&KeyValue| {
             given.key.part == Part::Tled && given.key.value(&self.ingredients) != given.key.value(&plain)

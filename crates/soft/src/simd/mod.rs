@@ -1,5 +1,5 @@
 //! Element kernels in f32, one element a lane: registers, their selection for this CPU, and the
-//! order in memory. `trepan-tled` and the rivals of this crate use the same, so that their times
+//! order in memory. `trepan-tled` and `trepan-rivals` use the same, so that their times
 //! compare methods and not code.
 
 mod kernel;

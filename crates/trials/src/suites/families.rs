@@ -10,6 +10,7 @@ use trepan_evidence::picture::Outcome;
 use trepan_evidence::report::Report;
 use trepan_evidence::suite::{Row, shown};
 use trepan_evidence::timer::Samples;
+use trepan_rivals::Family as _;
 
 /// A family of methods that answer the same question.
 struct Family {

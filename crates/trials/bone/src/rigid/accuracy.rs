@@ -8,6 +8,7 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_evidence::timer::Samples;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family;
 
 /// From this depth on a touch counts, mm: the least that the thesis measured (0.2 to 0.8 mm).
 const TOUCH_MM: f64 = 0.2;

@@ -28,6 +28,7 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidContact, RigidStep};
+use trepan_rivals::Family;
 
 /// Length of a tick in the map, ms.
 const TICK_MS: f32 = 1.0;

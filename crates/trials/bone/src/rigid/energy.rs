@@ -23,6 +23,7 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family;
 
 const HAND_TICKS: usize = 10_000;
 const MOST_MJ: f64 = 0.1;

@@ -12,6 +12,7 @@ use trepan_evidence::picture::Outcome;
 use trepan_evidence::suite::{Findings, Gate};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidContact, RigidStep};
+use trepan_rivals::Family;
 use trepan_trials_scenes::conditions;
 use trepan_volume::{AIR_HU, VoxelVolume};
 

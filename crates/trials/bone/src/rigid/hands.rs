@@ -30,6 +30,7 @@ use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone, Scan};
 use trepan_rigid::{Method, RigidContact, RigidStep};
+use trepan_rivals::Family;
 use trepan_volume::{AIR_HU, Grid, Interpolation, VoxelVolume, resample};
 
 const MASS_G: f64 = 250.0;

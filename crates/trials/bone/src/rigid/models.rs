@@ -22,6 +22,7 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_evidence::timer::Samples;
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family;
 use trepan_volume::VoxelVolume;
 
 /// Table 3.1: voxels along an edge of 200 mm.

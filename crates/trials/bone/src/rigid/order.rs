@@ -27,6 +27,7 @@ use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::removal::{Pressed, RemovalLaw};
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family;
 use trepan_volume::VoxelVolume;
 
 /// Voxels, mm: h, h/2, h/4.

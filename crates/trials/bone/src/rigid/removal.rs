@@ -28,6 +28,7 @@ use trepan_evidence::timer::Samples;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family;
 
 const R: f64 = 2.0;
 const SUNK_MM: f64 = 1.0;

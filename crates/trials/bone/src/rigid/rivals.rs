@@ -28,8 +28,9 @@ use trepan_evidence::part::Part;
 use trepan_evidence::picture::Table;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Tool, Vec3};
-use trepan_rigid::rivals::{burr_and_shaft, centre_line, thesis};
 use trepan_rigid::{Method, RigidContact, RigidStep};
+use trepan_rivals::Family;
+use trepan_rivals::rigid::{burr_and_shaft, centre_line, thesis};
 
 /// Penetration at which stiffness is compared, mm.
 const REFERENCE_MM: f32 = 0.5;

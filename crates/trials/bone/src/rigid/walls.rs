@@ -21,6 +21,7 @@ use trepan_evidence::picture::{Map, Outcome};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family;
 
 const VOXEL_MM: f64 = 0.5;
 const EDGE: usize = 48;

@@ -243,3 +243,26 @@ impl Of {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_rivals::Family;
+
+    #[test]
+    fn every_stored_method_exists_and_only_those_with_a_proxy_hold_walls() {
+        let rows = Rows::stored().unwrap();
+        for what in rows.bone.iter().map(|row| row.what) {
+            let method = trepan_rigid::Method::named(what.method).expect(what.method);
+            let fits = holds_walls(&Bone { spacing_mm: 100.0, ..what }, 1.0);
+            assert_eq!(fits, method.has_proxy(), "{}", what.method);
+            let points = method.with_points(what.points).points() as f64;
+            let jams = !holds_walls(&what, 10.0);
+            let sparse = points > 0.0 && 400.0 * std::f64::consts::PI > points * what.spacing_mm.powi(2);
+            assert_eq!(jams, !method.has_proxy() || sparse, "{} {}", what.method, what.points);
+        }
+        for solver in rows.tissue.iter().map(|row| row.what.solver) {
+            assert!(solver == "tled" || trepan_soft::Method::named(solver).is_some(), "{solver}");
+        }
+    }
+}

@@ -10,6 +10,7 @@ use crate::suites::deformable::stability::{self, EDGE_MM, PLAIN, cube, endure};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_rivals::Family as _;
 
 /// Largest share of the points inside that may be missed or invented.
 const MOST_SHARE: f64 = 0.01;

@@ -17,6 +17,7 @@ use trepan_evidence::nearest::{Condition, Scale, Trial, exceeds};
 use trepan_geometry::{Tool, Vec3};
 use trepan_haptics::simulated::Config;
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::Family as _;
 
 /// Largest error and largest false change of force in a tick, N: 15 % of a Touch's peak.
 const MOST_N: f64 = 0.5;

@@ -25,11 +25,11 @@ use crate::suites::deformable::scene::{PATHS, RADIUS_MM, Scene};
 use crate::suites::{Part, Scope};
 use std::time::Instant;
 use trepan_contact::{ForceModel, Viscoelastic};
-use trepan_deformable::rivals::thesis;
 use trepan_deformable::{Config, Method, Response, TissueCollision, TissueStep};
 use trepan_evidence::picture::Series;
 use trepan_evidence::suite::Findings;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile};
+use trepan_rivals::deformable::thesis;
 
 /// Limit of a frame, µs.
 const FRAME_US: f64 = 1000.0;

@@ -17,8 +17,8 @@ use trepan_contact::{ForceModel, Viscoelastic};
 use trepan_evidence::picture::Series;
 use trepan_evidence::suite::Findings;
 use trepan_geometry::{Buttons, Pointshell, Spread, Tool, ToolState, Vec3, quantile};
-use trepan_rigid::rivals::{Ball, Sweep, thesis};
 use trepan_rigid::{Method, RigidStep};
+use trepan_rivals::rigid::{Ball, Sweep, thesis};
 use trepan_volume::VoxelVolume;
 
 /// The thesis's method as printed, put right, and ours.

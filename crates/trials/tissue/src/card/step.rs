@@ -13,6 +13,7 @@ use trepan_evidence::suite::{Findings, Gate};
 use trepan_evidence::timer::Samples;
 use trepan_geometry::{Vec3, units};
 use trepan_gpu::{Gpu, GpuError};
+use trepan_rivals::Family;
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::gpu::GpuTled;
 use trepan_tled::{Config, Relaxation, Tled};

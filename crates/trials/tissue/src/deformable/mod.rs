@@ -14,10 +14,11 @@ pub use recording::record_all;
 use ride::{Ride, START, ride};
 use scene::{PATHS, Scene};
 use trepan_deformable::Method;
-use trepan_deformable::rivals::uniform_grid;
+use trepan_deformable::search::uniform_grid;
 use trepan_evidence::part::{Part, Scope};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::Vec3;
+use trepan_rivals::Family;
 use truth::Truth;
 
 /// Required speed-up of the recommended method over scanning all tetrahedra, from 48,000 of them

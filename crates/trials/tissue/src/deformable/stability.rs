@@ -7,6 +7,7 @@ use trepan_evidence::picture::Outcome;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::TetMesh;
+use trepan_rivals::Family;
 use trepan_trials_scenes::conditions;
 
 const CELLS: usize = 6;

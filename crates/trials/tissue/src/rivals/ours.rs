@@ -6,6 +6,7 @@ use std::time::Instant;
 use trepan_evidence::part::Scope;
 use trepan_evidence::suite::Findings;
 use trepan_geometry::{Vec3, units};
+use trepan_rivals::Family;
 use trepan_soft::{Body, Loads, Method, SoftSolver};
 use trepan_tled::{Config, Tled};
 

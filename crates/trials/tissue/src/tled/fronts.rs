@@ -12,7 +12,8 @@ use std::time::Instant;
 use trepan_evidence::picture::{Chart, Mark};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
-use trepan_soft::rivals::reference::{self, Order, Reference};
+use trepan_rivals::Family;
+use trepan_soft::reference::{self, Order, Reference};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 

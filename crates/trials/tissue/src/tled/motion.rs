@@ -6,7 +6,7 @@ use glam::DMat3;
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::TetMesh;
-use trepan_soft::rivals::reference::{self, Reference};
+use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Settling, Tled};
 

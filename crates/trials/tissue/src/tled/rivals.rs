@@ -11,6 +11,7 @@ use trepan_contact::NodalContact;
 use trepan_evidence::picture::Outcome;
 use trepan_evidence::suite::{Findings, Gate};
 use trepan_geometry::{Vec3, units};
+use trepan_rivals::Family;
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 use trepan_trials_scenes::conditions;

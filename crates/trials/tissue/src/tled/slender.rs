@@ -8,7 +8,7 @@
 use super::{Part, Scope};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
-use trepan_soft::rivals::reference::{self, Order, Reference};
+use trepan_soft::reference::{self, Order, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Settling, Tled};
 

@@ -6,6 +6,7 @@ use trepan_contact::NodalContact;
 use trepan_evidence::picture::{Map, Outcome};
 use trepan_evidence::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
+use trepan_rivals::Family;
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Relaxation, Settling, Tled};
 
