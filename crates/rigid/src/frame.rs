@@ -96,12 +96,14 @@ impl HeldTool {
     }
 
     /// Time since the last tick, ms; nothing where that is no time.
+    #[inline]
     pub fn tick_ms(&self) -> Option<f32> {
         (self.dt_ms.is_finite() && self.dt_ms > 0.0).then_some(self.dt_ms)
     }
 
     /// Fills the manifold for a ball that touches under the proxy, if normal and depth are
     /// something.
+    #[inline]
     pub fn report(&self, normal: Vec3, depth_mm: f32, out: &mut RigidStep) {
         if normal != Vec3::ZERO && depth_mm > 0.0 {
             (out.manifold.normal, out.manifold.depth_mm) = (normal, depth_mm);
@@ -200,6 +202,7 @@ impl<P: PenaltyProbe> MethodCore for P {
 }
 
 /// The direction of `push` and `depth`, if both are something.
+#[inline]
 pub fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<WholeContact> {
     let normal = push.normalize_or_zero();
     if normal == Vec3::ZERO {
@@ -220,11 +223,13 @@ impl Pushes {
     }
 
     /// Forgets all.
+    #[inline]
     pub fn clear(&mut self) {
         self.0.clear();
     }
 
     /// Adds a point's push, also to the contacts of `out`.
+    #[inline]
     pub fn push(&mut self, contact: Contact, out: &mut RigidStep) {
         out.points_in_contact += 1;
         out.manifold.push(contact);
@@ -234,6 +239,7 @@ impl Pushes {
     }
 
     /// The direction of all pushes together, and the depth of the deepest along it.
+    #[inline]
     pub fn deepest(&self, out: &mut RigidStep) -> Option<WholeContact> {
         out.voxels_in_contact = out.points_in_contact;
         let push: Vec3 = self.0.iter().map(|c| c.depth_mm * c.normal).sum();

@@ -37,6 +37,7 @@ pub struct Shaft {
 
 impl Shaft {
     /// The shaft of a tool with its tip at `start` and its unit `axis`, on a grid of this spacing.
+    #[inline]
     pub fn of(tool: &Tool, spacing: f32, start: Vec3, axis: Vec3) -> Self {
         let &Tool { tip_radius_mm, shaft_radius_mm, shaft_length_mm, .. } = tool;
         let span = (tip_radius_mm / spacing, shaft_length_mm.max(tip_radius_mm) / spacing);
@@ -44,6 +45,7 @@ impl Shaft {
     }
 
     /// The shaft in another unit of length, of which there are `factor` in one of this.
+    #[inline]
     pub fn scaled(&self, factor: f32) -> Self {
         let (from, to) = self.span;
         let span = (factor * from, factor * to);
@@ -51,11 +53,13 @@ impl Shaft {
     }
 
     /// Place along the shaft of what is nearest to `point`.
+    #[inline]
     pub fn along(&self, point: Vec3) -> f32 {
         (point - self.start).dot(self.axis).clamp(self.span.0, self.span.1)
     }
 
     /// The point of the axis at `s`.
+    #[inline]
     pub fn at(&self, s: f32) -> Vec3 {
         self.start + s * self.axis
     }

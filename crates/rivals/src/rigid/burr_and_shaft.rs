@@ -82,6 +82,7 @@ struct Press {
 
 impl Press {
     /// Takes in the voxels of a brick that are within a rod.
+    #[inline]
     fn add(&mut self, bone: &BoneVolume, brick: IVec3, rod: &Rod, visited: &mut u32) {
         let lanes = f32x8::from([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let (border, zero) = (i16x8::splat(bone.isovalue()), f32x8::ZERO);
@@ -136,6 +137,7 @@ impl Press {
 }
 
 /// Lanes in which a value reaches the border.
+#[inline]
 fn wide_mask(values: i16x8, border: i16x8) -> f32x8 {
     let reached = values.simd_ge(border).to_array();
     wide(&reached).simd_lt(f32x8::ZERO)

@@ -54,6 +54,7 @@ impl PenaltyProbe for Rays {
 
 /// The way from a place in voxels, which is `over` HU in bone, along a unit vector to the isovalue,
 /// at most `longest`, mm.
+#[inline]
 pub(crate) fn way_out(
     bone: &BoneVolume,
     (from, inward): (Vec3, Vec3),

@@ -56,6 +56,7 @@ fn inverse(x: f64) -> f64 {
 }
 
 /// The part of the segment inside `bounds`, as shares of the way; `None` when it stays outside.
+#[inline]
 pub(crate) fn clipped(from: Vec3, to: Vec3, bounds: Aabb) -> Option<(f32, f32)> {
     let way = to - from;
     let (mut enter, mut leave) = (0.0f32, 1.0f32);
@@ -74,6 +75,7 @@ pub(crate) fn clipped(from: Vec3, to: Vec3, bounds: Aabb) -> Option<(f32, f32)> 
 
 /// Share of the way from `from` to `to`, world mm, at which a point enters the first bone voxel.
 /// Adds the voxels visited to `visited`.
+#[inline]
 pub(crate) fn first_bone(bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
     let (enter, leave) = clipped(from, to, bone.bounds().inflated(bone.spacing_mm()))?;
     let (a, b) = (bone.grid_of(from.lerp(to, enter)), bone.grid_of(from.lerp(to, leave)));
