@@ -10,6 +10,7 @@ use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, SessionsTask, Task, rate};
 use crate::recordings;
 use crate::session::{Place, Session, SessionResult};
+use crate::setting_paths;
 use crate::show::driver;
 use crate::{Inputs, Options, Program, SessionError};
 use crate::{sessions, ticks};
@@ -69,7 +70,7 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     if options.lists_keys() {
-        print!("{}", table());
+        print!("{}\nPaths of other settings\n{}", table(), setting_paths::table());
         return ExitCode::SUCCESS;
     }
     if let Some(task) = &options.task {
@@ -130,6 +131,7 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
             ExitCode::SUCCESS
         }),
         Task::Recording(RecordingTask::Check { file }) => recordings::check(program, file),
+        Task::Recording(RecordingTask::Settings { file }) => recordings::settings(file),
         Task::Recording(RecordingTask::Repair { file, out }) => recordings::repair_file(file, out),
         Task::Recording(RecordingTask::Film { folder, out }) => film::make(folder, out).map_err(SessionError::from),
         Task::Recording(RecordingTask::Export { file, csv, every_ms }) => ticks::export(file, csv, *every_ms),

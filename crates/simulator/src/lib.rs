@@ -27,6 +27,7 @@ mod replay_tests;
 mod session;
 mod session_setup;
 mod sessions;
+mod setting_paths;
 mod settings;
 mod show;
 mod ticks;

@@ -1,6 +1,8 @@
 //! The command line that the three programs share.
 
 use crate::error::SessionError;
+use crate::setting_paths;
+use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::convert::Infallible;
 use std::ffi::OsString;
@@ -111,8 +113,10 @@ pub struct Options {
     #[command(flatten)]
     pub tolerances: Tolerances,
     /// Ingredient of the models by hand, as in element=locking-free,threads=2; the last one of a
-    /// key counts. `--set list` prints the keys [default: by --quality; a replay's as recorded]
-    #[arg(help_heading = "Models and accuracy", long = "set", value_name = "KEY=VALUE", value_delimiter = ',', value_parser = setting)]
+    /// key counts. Also any setting by its path in a recording, as in operation.flap_mm=30, and
+    /// @FILE of such lines. `--set list` prints keys and paths [default: by --quality; a replay's
+    /// as recorded]
+    #[arg(help_heading = "Models and accuracy", long = "set", value_name = "KEY=VALUE|@FILE", value_delimiter = ',', value_parser = setting)]
     pub settings: Vec<Option<KeyValue>>,
     /// Solver of the brain's tissue, as --set solver=NAME
     #[arg(help_heading = "Models and accuracy", long, value_name = "NAME")]
@@ -334,6 +338,11 @@ pub enum RecordingTask {
         /// A recording, such as session.mcap
         file: PathBuf,
     },
+    /// Print a recorded session's settings as a file for --set @FILE
+    Settings {
+        /// A recording, such as session.mcap
+        file: PathBuf,
+    },
     /// Write an intact recording from all that can be read of a truncated or damaged one, also
     /// after the damage; other programs can open it
     Repair {
@@ -485,13 +494,15 @@ impl Options {
     /// Parses a program's command line; its help begins with what the program is for.
     pub(crate) fn of_program(
         program: Program,
-        words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+        words: impl IntoIterator<Item = impl Into<OsString>>,
     ) -> Result<Self, clap::Error> {
         let (name, purpose) = (program.name(), program.purpose());
         let examples: String = program.examples().iter().map(|line| format!("  {name} {line}\n")).collect();
         let long = format!("{purpose}\n\nExamples:\n{examples}");
         let mut command =
             Self::command().name(name).bin_name(name).about(purpose).long_about(long.trim_end().to_string());
+        let words = setting_paths::expand(words.into_iter().map(Into::into));
+        let words = words.map_err(|fault| command.error(ErrorKind::ValueValidation, fault))?;
         let matches = command.try_get_matches_from_mut(words)?;
         Self::from_arg_matches(&matches).map_err(|fault| fault.format(&mut command))
     }

@@ -3,6 +3,7 @@
 
 use crate::config::SessionConfig;
 use crate::error::SessionError;
+use crate::setting_paths;
 use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::wire::SessionHeader;
@@ -16,6 +17,13 @@ pub(crate) fn not_whole(program: Program, file: &Path, recording: &Recording) ->
     let (losses, program, file) = (recording.losses()?, program.name(), file.display());
     let remedy = format!("; `{program} recording repair {file} NEW.mcap` keeps all that can be read");
     Some(format!("{file} is not whole: {losses}{}", if recording.damage.is_some() { &remedy } else { "" }))
+}
+
+/// Prints a recorded session's settings.
+pub(crate) fn settings(file: &Path) -> Result<ExitCode, SessionError> {
+    let config = SessionConfig::of(&Recording::open(file)?.header)?;
+    print!("{}", setting_paths::file(&config.entries(), &config.ingredients));
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Opens a recording for replay on a case; refuses one of another patient or without ticks.
