@@ -69,12 +69,11 @@ const TOUCH: f32 = 0.05;
 const MARGIN: f32 = 0.1;
 /// What a ball may grow and be pushed off in a tick, nodes.
 const ROOM: f32 = 0.25;
-/// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. That is how many
-/// times the sum of what the walls push exceeds the pull of the hand. 0.4 is between walls less
-/// than 47 degrees apart.
+/// Jammed: the sum of the contact forces exceeds 1/JAM times the pull of the hand. 0.4 is reached
+/// between walls less than 47 degrees apart.
 const JAM: f32 = 0.4;
-/// Growing may move a ball by so many times its growth.
-const PUSHED: f32 = 2.4;
+/// Largest move of a growing ball, times its growth.
+const MAX_PUSH: f32 = 2.4;
 /// A shaft this far in bone gives way, voxels.
 const PRESSED: f32 = 1e-3;
 /// Way beyond that of the hand that rounding may need, mm.
@@ -143,7 +142,7 @@ pub struct GodObjectSphere {
     /// Whether the proxy has been put anywhere yet.
     placed: bool,
     /// Whether the burr cuts in this tick.
-    works: bool,
+    cuts: bool,
     /// Radius of the ball that touches: up to the tool's, mm.
     ball_mm: f32,
     /// Whether only walls along the pull of the hand hold the proxy.
@@ -151,15 +150,14 @@ pub struct GodObjectSphere {
     /// Where the hand was in the last tick, world mm.
     hand: Vec3,
     /// How far the proxy may still go in this tick, mm.
-    left_mm: f32,
-    /// Free space around the ball that is sure, from the last selection of discs: centre, grid;
-    /// radius, voxels.
-    sure: (Vec3, f32),
+    travel_mm: f32,
+    /// Ball of verified free space, from the last selection of discs: centre, grid; radius, voxels.
+    free_space: (Vec3, f32),
     /// Which bone the window shows.
     seen: Option<LastBone>,
     surface: LocalSurface,
-    /// Whether the ball was clear of bone, so that nothing needs to be looked for inside it.
-    clear: bool,
+    /// Whether the ball was outside of all bone, so that none is searched for inside it.
+    is_outside: bool,
     lean: Lean,
     near: InReach,
     /// What the burr alone is pushed, mm: what it cuts with.
@@ -191,15 +189,15 @@ impl GodObjectSphere {
             tool,
             proxy: Pose::IDENTITY,
             placed: false,
-            works: false,
+            cuts: false,
             ball_mm: tool.tip_radius_mm,
             jammed: false,
             hand: Vec3::ZERO,
-            left_mm: 0.0,
-            sure: (Vec3::ZERO, 0.0),
+            travel_mm: 0.0,
+            free_space: (Vec3::ZERO, 0.0),
             seen: None,
             surface: LocalSurface::new(tool.tip_radius_mm, MAX_DISCS, config.disc_nodes),
-            clear: false,
+            is_outside: false,
             lean: Lean::new(if config.shaft { MAX_DISCS } else { 0 }, config.shaft_disc_voxels),
             near: InReach::with_capacity(3 * MAX_DISCS),
             pressed: Vec3::ZERO,
@@ -210,16 +208,16 @@ impl GodObjectSphere {
         }
     }
 
-    /// Forgets what is not of this bone as it is now.
-    fn look_at(&mut self, bone: &BoneVolume) {
+    /// Forgets what was known of another bone, or of this one before it changed.
+    fn track_changes(&mut self, bone: &BoneVolume) {
         let this = Some(LastBone { bone: bone.id(), undone: bone.undone() });
         if self.seen != this {
             self.seen = this;
-            self.clear = false;
+            self.is_outside = false;
             self.surface.forget();
             self.lean.renew();
         }
-        if self.surface.look_at(bone) {
+        if self.surface.track_changes(bone) {
             self.lean.renew();
         }
     }
@@ -238,7 +236,7 @@ impl GodObjectSphere {
         let radius = self.tool.tip_radius_mm;
         let least = (radius - self.config.slop_voxels * bone.spacing_mm()).max(0.5 * radius);
         // A burr at work cuts itself free.
-        if self.jammed && !self.works && self.ball_mm > least {
+        if self.jammed && !self.cuts && self.ball_mm > least {
             self.ball_mm = least.max(self.ball_mm - self.config.yield_mm_per_ms * dt_ms);
         }
     }
@@ -252,7 +250,8 @@ impl GodObjectSphere {
         if self.ball_mm >= full && !ball.inside {
             return;
         }
-        let room = (self.sure.1 - grid.distance(self.sure.0)).min(ball.clearance(&mut self.near, grid - base));
+        let room =
+            (self.free_space.1 - grid.distance(self.free_space.0)).min(ball.clearance(&mut self.near, grid - base));
         self.ball_mm = self.ball_mm.max(full.min(spacing * (room - MARGIN)));
         if self.jammed || self.proxy.translation == self.hand || self.ball_mm >= full && !ball.inside {
             return;
@@ -263,7 +262,7 @@ impl GodObjectSphere {
         let (from, goal) = (grid - base, bone.node_at(self.hand) - base);
         let Some(to) = grown.settle(&mut self.near, &mut self.spaces, from, goal, (growth, 0.0)) else { return };
         let push = to - from;
-        let most = (PUSHED * growth).min(self.left_mm / spacing);
+        let most = (MAX_PUSH * growth).min(self.travel_mm / spacing);
         // A hand that draws the tool off is not overtaken.
         if push.length() <= most && push.dot(motion) <= 0.0 {
             self.ball_mm = grown.radius * spacing;
@@ -283,11 +282,11 @@ impl GodObjectSphere {
             self.ball_mm = self.tool.tip_radius_mm;
             self.near.clear();
             self.surface.leave();
-            self.sure = (bone.node_at(device), f32::MAX);
-            self.clear = true;
+            self.free_space = (bone.node_at(device), f32::MAX);
+            self.is_outside = true;
             return true;
         }
-        self.give_way(bone, dt_ms, out);
+        self.recover_penetration(bone, dt_ms, out);
         for _ in 0..self.config.max_moves {
             if self.advance(bone, device, out) {
                 return true;
@@ -301,18 +300,18 @@ impl GodObjectSphere {
     fn advance(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) -> bool {
         let spacing = bone.node_mm();
         let start = bone.node_at(self.proxy.translation);
-        if !self.know(bone, start, out) {
+        if !self.gather_contacts(bone, start, out) {
             return true;
         }
         let base = self.surface.base();
         let (from, goal) = (start - base, bone.node_at(device) - base);
         let (ball, reach, full) = (self.ball(bone), self.reach(bone), self.tool.tip_radius_mm / spacing);
         let nearest = self.select(bone, &ball, from, out);
-        self.sure = (start, full + reach);
-        self.clear = nearest > full - 0.5;
-        let limits = Limits { reach, way: self.left_mm / spacing };
+        self.free_space = (start, full + reach);
+        self.is_outside = nearest > full - 0.5;
+        let limits = Limits { reach, way: self.travel_mm / spacing };
         let slide = ball.slide(&mut self.near, &mut self.spaces, from, goal, limits);
-        self.left_mm = (self.left_mm - slide.way * spacing).max(0.0);
+        self.travel_mm = (self.travel_mm - slide.way * spacing).max(0.0);
         out.fallbacks += u32::from(slide.contradiction);
         if slide.to == goal {
             self.proxy.translation = device;
@@ -325,7 +324,7 @@ impl GodObjectSphere {
     /// How far the ball may move with one set of discs, nodes: what is left of its way in this
     /// tick, and room to grow.
     fn reach(&self, bone: &BoneVolume) -> f32 {
-        self.config.move_nodes.min(self.left_mm / bone.node_mm() + ROOM)
+        self.config.move_nodes.min(self.travel_mm / bone.node_mm() + ROOM)
     }
 
     /// The discs near the tool with its ball at `from`. Returns the distance of the nearest from
@@ -341,9 +340,9 @@ impl GodObjectSphere {
     }
 
     /// Moves the tip aside where the turning hand has pressed the shaft into bone.
-    fn give_way(&mut self, bone: &BoneVolume, dt_ms: f32, out: &mut RigidStep) {
+    fn recover_penetration(&mut self, bone: &BoneVolume, dt_ms: f32, out: &mut RigidStep) {
         let (spacing, start) = (bone.node_mm(), bone.node_at(self.proxy.translation));
-        if !self.config.shaft || !self.know(bone, start, out) {
+        if !self.config.shaft || !self.gather_contacts(bone, start, out) {
             return;
         }
         let base = self.surface.base();
@@ -355,15 +354,15 @@ impl GodObjectSphere {
         }
         let most = self.config.recover_mm_per_ms * dt_ms / spacing;
         let Some(to) = ball.settle(&mut self.near, &mut self.spaces, from, from, (0.0, most)) else { return };
-        if to.distance(from) <= PUSHED * most {
+        if to.distance(from) <= MAX_PUSH * most {
             self.proxy.translation = bone.origin() + spacing * (to + base);
         }
     }
 
-    /// Makes sure that all discs in reach of the ball at node `at` are known; false when the ball
-    /// is too large for that.
-    fn know(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
-        self.surface.know(bone, &self.tool, at, (self.config.move_nodes, self.clear), out)
+    /// Gathers all discs in reach of the ball at node `at`; false when the ball is too large for
+    /// that.
+    fn gather_contacts(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
+        self.surface.gather(bone, &self.tool, at, (self.config.move_nodes, self.is_outside), out)
     }
 
     /// Fills the manifold from where proxy and device are.
@@ -408,6 +407,26 @@ impl GodObjectSphere {
             self.pressed = pressed;
         }
     }
+
+    /// Takes away what the burr cuts, pressed as the report says.
+    fn remove(&mut self, bone: &BoneVolume, dt_ms: f32, out: &mut RigidStep) {
+        if !self.cuts {
+            self.burr.pause();
+            return;
+        }
+        let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
+        let axis = self.proxy.rotation * Vec3::Z;
+        let side = 0.5 * self.tool.cutting_mm * axis;
+        let depth_mm = self.pressed.length();
+        let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, side, axis, depth_mm, dt_ms };
+        self.burr.cut(bone, &cut, &mut self.surface.nodes, out);
+        if self.burr.changed() {
+            self.surface.cut(self.burr.opened());
+        }
+        if self.config.shaft && self.burr.has_opened() {
+            self.lean.opened(radius_mm / bone.spacing_mm() + 4.0);
+        }
+    }
 }
 
 impl RigidContact for GodObjectSphere {
@@ -423,33 +442,18 @@ impl RigidContact for GodObjectSphere {
             self.reset(tool.world_from_tool);
         }
         self.proxy.rotation = tool.world_from_tool.rotation;
-        self.works = drilling && self.tool.kind.cuts();
-        self.left_mm += device.distance(self.hand) + self.config.yield_mm_per_ms * dt_ms + ROUNDING_MM;
+        self.cuts = drilling && self.tool.kind.cuts();
+        self.travel_mm += device.distance(self.hand) + self.config.yield_mm_per_ms * dt_ms + ROUNDING_MM;
         let motion = device - self.hand;
         self.hand = device;
-        self.look_at(bone);
+        self.track_changes(bone);
         self.shrink(bone, dt_ms);
         if self.follow(bone, device, dt_ms, out) {
             self.grow(bone, motion, dt_ms);
-            self.left_mm = 0.0;
+            self.travel_mm = 0.0;
         }
         self.report(bone, device, out);
-        if self.works {
-            let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
-            let depth_mm = self.pressed.length();
-            let axis = self.proxy.rotation * Vec3::Z;
-            let side = 0.5 * self.tool.cutting_mm * axis;
-            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, side, axis, depth_mm, dt_ms };
-            self.burr.cut(bone, &cut, &mut self.surface.nodes, out);
-            if self.burr.changed() {
-                self.surface.cut(self.burr.opened());
-            }
-            if self.config.shaft && self.burr.has_opened() {
-                self.lean.opened(radius_mm / bone.spacing_mm() + 4.0);
-            }
-        } else {
-            self.burr.pause();
-        }
+        self.remove(bone, dt_ms, out);
     }
 
     fn proxy(&self) -> Pose {
@@ -460,8 +464,8 @@ impl RigidContact for GodObjectSphere {
         self.proxy = pose;
         self.placed = pose.translation.is_finite();
         (self.ball_mm, self.jammed) = (self.tool.tip_radius_mm, false);
-        (self.hand, self.left_mm) = (pose.translation, 0.0);
-        self.clear = false;
+        (self.hand, self.travel_mm) = (pose.translation, 0.0);
+        self.is_outside = false;
         self.surface.forget();
         self.lean.renew();
         self.near.clear();

@@ -61,7 +61,7 @@ impl LocalSurface {
     }
 
     /// Reads anew what others have changed. Returns whether there was anything.
-    pub fn look_at(&mut self, bone: &BoneVolume) -> bool {
+    pub fn track_changes(&mut self, bone: &BoneVolume) -> bool {
         let changed = self.nodes.renew(bone);
         if changed {
             self.renew();
@@ -90,15 +90,14 @@ impl LocalSurface {
         self.discs.voxels
     }
 
-    /// Makes sure that the discs within `reach` of a ball at `centre` are known; false when it is
-    /// too large for that. What lies more than a node inside the ball
-    /// is not looked for when it is `clear` of bone.
-    pub fn know(
+    /// Gathers the discs within `reach` of a ball at `centre`; false when it is too large for that.
+    /// Nothing is searched for more than a node inside a ball that is `outside` of bone.
+    pub fn gather(
         &mut self,
         bone: &BoneVolume,
         tool: &Tool,
         centre: Vec3,
-        (reach, clear): (f32, bool),
+        (reach, outside): (f32, bool),
         out: &mut RigidStep,
     ) -> bool {
         let (radius, middle) = (tool.tip_radius_mm / bone.node_mm(), centre.round().as_ivec3());
@@ -121,7 +120,7 @@ impl LocalSurface {
             return false;
         };
         let far = radius + reach + AHEAD + EXTENT * self.disc * bone.cut_nodes() as f32;
-        let hollow = if clear { radius - AHEAD - 1.0 } else { 0.0 };
+        let hollow = if outside { radius - AHEAD - 1.0 } else { 0.0 };
         self.discs.gather(&self.nodes.fine(), centre, hollow, far);
         (self.at, self.worn) = (Some(centre), false);
         self.opened.clear();
@@ -163,7 +162,7 @@ mod tests {
             }
             drop(writer);
             let (mut surface, mut out) = (LocalSurface::new(1000.0, 8192, 0.8), RigidStep::default());
-            assert!(surface.know(&bone, &Tool::burr(r), centre, (0.5, false), &mut out));
+            assert!(surface.gather(&bone, &Tool::burr(r), centre, (0.5, false), &mut out));
             let at = centre - surface.base();
             let discs = surface.shaped(at, radius + 0.5);
             let wall = radius + clearance(bone.node_mm(), 1000.0);
@@ -189,7 +188,7 @@ mod tests {
             let bone = BoneVolume::new(&ct, 400).unwrap();
             let tip = 13.0 * Vec3::new(0.3, 0.5, 0.7).normalize();
             let (mut surface, mut out) = (LocalSurface::new(1000.0, 8192, 0.8), RigidStep::default());
-            assert!(surface.know(&bone, &Tool::burr(3.0), bone.node_at(tip), (0.5, false), &mut out));
+            assert!(surface.gather(&bone, &Tool::burr(3.0), bone.node_at(tip), (0.5, false), &mut out));
             let (at, reach) = (bone.node_at(tip) - surface.base(), 3.0 / bone.node_mm());
             let seen = surface.shaped(at, reach + 0.5).iter().map(|disc| disc.way_to(at - disc.centre));
             let near = seen.min_by(|a, b| a.0.length().total_cmp(&b.0.length())).expect("there is surface");
