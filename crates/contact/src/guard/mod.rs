@@ -48,6 +48,8 @@ pub struct ForceGuard {
     observer: PassivityObserver,
     applied: Wrench,
     heat: Heat,
+    /// Whether the last force was shortened to spare the motors.
+    heat_limited: bool,
     input: Input,
     ramp_ms: f32,
     released: bool,
@@ -63,6 +65,7 @@ impl ForceGuard {
             observer: PassivityObserver::default(),
             applied: Wrench::ZERO,
             heat: Heat::default(),
+            heat_limited: false,
             input: Input::default(),
             ramp_ms: 0.0,
             released: false,
@@ -115,6 +118,11 @@ impl ForceGuard {
     /// The energy account.
     pub fn passivity_observer(&self) -> &PassivityObserver {
         &self.observer
+    }
+
+    /// Whether the last wrench's force was shortened to spare the motors.
+    pub fn is_heat_limited(&self) -> bool {
+        self.heat_limited
     }
 
     /// Heat θ of the motors by their forces so far; 1 is what they bear for any time.
@@ -178,10 +186,10 @@ impl ForceGuard {
         let (mut force, cut_force) = shortened(goal.force, self.config.max_force_n);
         let (torque, cut_torque) = shortened(goal.torque, self.config.max_torque_nmm);
         self.counters.clamped += u64::from(cut_force || cut_torque);
+        self.heat_limited = false;
         if let Some(bearable_n) = self.heat.bearable_n(self.applied.force.length(), dt_ms, &self.config) {
-            let (cooler, cut) = shortened(force, bearable_n);
-            self.counters.heated += u64::from(cut);
-            force = cooler;
+            (force, self.heat_limited) = shortened(force, bearable_n);
+            self.counters.heated += u64::from(self.heat_limited);
         }
         Wrench { force, torque }
     }

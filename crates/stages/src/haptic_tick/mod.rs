@@ -10,13 +10,12 @@
 //! a slow collision thread reduces accuracy, not stability. The force of an old patch fades: full
 //! force up to [`FRESH_MS`], none after [`GONE_MS`].
 //!
-//! The passes of a tick, each a function of the same name:
+//! A tick is nine stages. Each hands on a plain value, and the record is made of all of them:
 //!
 //! ```text
-//! read      last_valid_state
-//! compute   change_tool → drills → undo → touch_bone → follow_flap → bone_ahead → sample
-//!           → touch_tissue → follow_fault → desired_wrench → guard
-//! apply     record → warn → count_hole; the caller gives the wrench to the device
+//! read      sense
+//! compute   follow_requests → touch_bone → sample → touch_tissue → desired_wrench → guard
+//! record    record → warn → count_hole; the caller gives the wrench to the device
 //! ```
 //!
 //! # Practice
@@ -49,43 +48,49 @@ use trepan_volume::DistanceField;
 impl HapticStage {
     /// Runs a tick; notices go to `notify`. The caller applies the wrench.
     pub fn tick(&mut self, input: &TickInput<'_>, notify: &mut dyn FnMut(Notice)) -> Tick {
-        let (tool, stale) = last_valid_state(&input.reading, self.last_valid);
-        self.last_valid = tool;
-        let lost = input.reading.status == Status::Lost;
-        let report = &mut |what| notify(Notice { tick: input.tick, time_ms: tool.time_ms, what });
-        self.change_tool(&tool, input.tick <= 1, report);
-        let drilling = self.drills(&tool);
-        let back_mm3 = self.undo(&tool, drilling, input.second, report);
-        self.touch_bone(&tool, drilling);
-        self.follow_flap(&tool, drilling, report);
-        let ahead_mm = self.bone_ahead(drilling);
-        let sample = self.sample(&tool, input.tick, drilling);
-        let held = self.touch_tissue(input.patch, &sample);
-        self.follow_fault(&tool, (lost, stale), report);
-        let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let desired = if let_go { self.let_go() } else { self.desired_wrench(&tool, drilling) };
-        let heated = self.guard.counters().heated;
-        let wrench = self.guard.guard(desired.sum(), &tool, self.config.dt_ms);
-        let warm = self.guard.counters().heated > heated;
-        let through = self.drill.came_through(&self.bone_step, ahead_mm);
-        let flags = [
-            (held, TickRecord::HELD),
-            (drilling, TickRecord::DRILLING),
-            (stale, TickRecord::STALE),
-            (lost, TickRecord::LOST),
-            (through, TickRecord::THROUGH),
-            (self.undo.runs(), TickRecord::UNDOING),
-        ];
-        let record = self.record(input, &sample, wrench, desired, &flags, back_mm3);
-        let inputs = self.warning_inputs(&record, &sample, ahead_mm, input.patch, (desired, warm));
-        self.warn(&record, inputs, report);
-        if through {
-            self.count_hole();
-            report(What::Through);
-        }
+        let hand = self.sense(&input.reading);
+        let report = &mut |what| notify(Notice { tick: input.tick, time_ms: hand.tool.time_ms, what });
+        let intent = self.follow_requests(&hand, input, report);
+        let bone = self.touch_bone(&hand, intent, report);
+        let sample = self.sample(&hand, input.tick, intent);
+        let is_held = self.touch_tissue(input.patch, &sample);
+        let desired = self.desired_wrench(&hand, intent, report);
+        let wrench = self.guard.guard(desired.sum(), &hand.tool, self.config.dt_ms);
+        let record = self.record(input, (&hand, intent, bone, is_held), &sample, (desired, wrench));
+        self.warn(&record, input.patch, &sample, (bone, desired), report);
+        self.count_hole(bone, report);
         self.scores.add(&record);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
     }
+}
+
+/// What the device says of the hand in a tick.
+#[derive(Clone, Copy, Debug)]
+struct Hand {
+    /// The tool, or its last valid pose at rest.
+    tool: ToolState,
+    /// Whether the device gave no usable pose.
+    is_stale: bool,
+    /// Whether the device is lost.
+    is_lost: bool,
+}
+
+/// What the hand does in a tick.
+#[derive(Clone, Copy, Debug)]
+struct Intent {
+    /// Whether the tool cuts.
+    drilling: bool,
+    /// Bone restored by undoing, mm³; negative for a redo.
+    restored_mm3: f32,
+}
+
+/// What the tool meets in the bone in a tick, beside the [`RigidStep`].
+#[derive(Clone, Copy, Debug)]
+struct BoneContact {
+    /// Remaining bone ahead of a cutting burr, mm; infinite if it does not cut.
+    ahead_mm: f32,
+    /// Whether the burr comes through, for the first time in its stroke.
+    came_through: bool,
 }
 
 /// Age up to which a patch gives its full force, ms.
@@ -296,10 +301,10 @@ impl HapticStage {
     }
 
     /// Switches the force off after a fault of the device until a deliberate action of the user.
-    fn follow_fault(&mut self, tool: &ToolState, (lost, stale): (bool, bool), report: &mut dyn FnMut(What)) {
+    fn follow_fault(&mut self, hand: &Hand, report: &mut dyn FnMut(What)) {
         if self.config.force_waits {
-            let status = DeviceStatus { lost, stale, touches: !self.is_free() };
-            let change = self.fault.follow(tool, status, self.config.dt_ms, &mut self.guard, self.released);
+            let status = DeviceStatus { lost: hand.is_lost, stale: hand.is_stale, touches: !self.is_free() };
+            let change = self.fault.follow(&hand.tool, status, self.config.dt_ms, &mut self.guard, self.released);
             change.into_iter().for_each(|waits| report(What::Force { waits, second: false }));
         }
     }
@@ -308,7 +313,24 @@ impl HapticStage {
         self.tray.tool()
     }
 
-    fn touch_bone(&mut self, tool: &ToolState, drilling: bool) {
+    /// The hand by a reading.
+    fn sense(&mut self, reading: &Reading) -> Hand {
+        let (tool, is_stale) = last_valid_state(reading, self.last_valid);
+        self.last_valid = tool;
+        Hand { tool, is_stale, is_lost: reading.status == Status::Lost }
+    }
+
+    /// Follows the buttons: changes the tool, cuts, undoes and redoes strokes.
+    fn follow_requests(&mut self, hand: &Hand, input: &TickInput<'_>, report: &mut dyn FnMut(What)) -> Intent {
+        self.change_tool(&hand.tool, input.tick <= 1, report);
+        let drilling = self.drills(&hand.tool);
+        let restored_mm3 = self.undo(&hand.tool, drilling, input.second, report);
+        Intent { drilling, restored_mm3 }
+    }
+
+    /// Runs the contact with bone and moves the flap.
+    fn touch_bone(&mut self, hand: &Hand, intent: Intent, report: &mut dyn FnMut(What)) -> BoneContact {
+        let (tool, drilling) = (&hand.tool, intent.drilling);
         match (&self.bone, &mut self.rigid[self.tray.slot()]) {
             (Some(bone), Some(rigid)) => {
                 rigid.step(bone, tool, drilling, self.config.dt_ms, &mut self.bone_step);
@@ -319,12 +341,18 @@ impl HapticStage {
             }
             _ => self.proxy = tool.world_from_tool,
         }
+        self.follow_flap(tool, drilling, report);
+        let ahead_mm = self.bone_ahead(drilling);
+        BoneContact { ahead_mm, came_through: self.drill.came_through(&self.bone_step, ahead_mm) }
     }
 
     /// Counts a hole through the bone.
-    fn count_hole(&mut self) {
-        self.holes += 1;
-        self.bone.iter().for_each(|bone| self.undo.newest(bone).through += 1);
+    fn count_hole(&mut self, bone: BoneContact, report: &mut dyn FnMut(What)) {
+        if bone.came_through {
+            self.holes += 1;
+            self.bone.iter().for_each(|bone| self.undo.newest(bone).through += 1);
+            report(What::Through);
+        }
     }
 
     /// Returns the speed of the spindle, 1/min: the free speed in air, reduced by the load in bone,
@@ -337,12 +365,13 @@ impl HapticStage {
         }
     }
 
-    fn sample(&mut self, tool: &ToolState, tick: u64, drilling: bool) -> ToolSample {
-        let mut state = ToolState { world_from_tool: self.proxy, ..*tool };
+    /// The tool for the other threads.
+    fn sample(&self, hand: &Hand, tick: u64, intent: Intent) -> ToolSample {
+        let mut state = ToolState { world_from_tool: self.proxy, ..hand.tool };
         if self.bone_step.manifold.touches() {
             state.twist = Default::default();
         }
-        ToolSample { tick, state, tool: self.tool(), slot: self.tray.slot(), drilling }
+        ToolSample { tick, state, tool: self.tool(), slot: self.tray.slot(), drilling: intent.drilling }
     }
 
     /// Sets the contact with tissue at the present pose; returns whether the patch in contact is
@@ -362,9 +391,15 @@ impl HapticStage {
         age_ms > FRESH_MS
     }
 
-    /// Returns the desired wrenches of bone, and of tissue in the brain phase only (thesis 6.4:
-    /// while drilling, tissue only causes warnings).
-    fn desired_wrench(&mut self, tool: &ToolState, drilling: bool) -> DesiredWrench {
+    /// Returns the desired wrenches; none after a fault or during a pause. Tissue has one in the
+    /// brain phase only (thesis 6.4: while drilling, it only causes warnings).
+    fn desired_wrench(&mut self, hand: &Hand, intent: Intent, report: &mut dyn FnMut(What)) -> DesiredWrench {
+        self.follow_fault(hand, report);
+        if hand.is_lost || self.fault.waits() || hand.tool.buttons.has(Buttons::PAUSE) {
+            self.config.bone_force.mean.reset();
+            return DesiredWrench::default();
+        }
+        let (tool, drilling) = (&hand.tool, intent.drilling);
         let free = self.spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
         self.config.bone_force.turn(self.spindle_rpm(drilling) / free);
         let dt_ms = self.config.dt_ms;
@@ -374,25 +409,25 @@ impl HapticStage {
         DesiredWrench { bone, tissue }
     }
 
-    /// Forgets what the tool held on to; no wrench.
-    fn let_go(&mut self) -> DesiredWrench {
-        self.config.bone_force.mean.reset();
-        DesiredWrench::default()
-    }
-
     fn record(
         &self,
         input: &TickInput<'_>,
+        (hand, intent, bone, is_held): (&Hand, Intent, BoneContact, bool),
         sample: &ToolSample,
-        wrench: GuardedWrench,
-        desired: DesiredWrench,
-        flags: &[(bool, u32)],
-        back_mm3: f32,
+        (desired, wrench): (DesiredWrench, GuardedWrench),
     ) -> TickRecord {
-        let clamped = desired.sum().force.length() > self.config.guard.max_force_n;
-        let of_stage =
-            [(clamped, TickRecord::CLAMPED), (self.released, TickRecord::RELEASED), (true, TickRecord::TISSUE)];
-        let bone = &self.bone_step.manifold;
+        let flags = [
+            (is_held, TickRecord::HELD),
+            (intent.drilling, TickRecord::DRILLING),
+            (hand.is_stale, TickRecord::STALE),
+            (hand.is_lost, TickRecord::LOST),
+            (bone.came_through, TickRecord::THROUGH),
+            (self.undo.runs(), TickRecord::UNDOING),
+            (desired.sum().force.length() > self.config.guard.max_force_n, TickRecord::CLAMPED),
+            (self.released, TickRecord::RELEASED),
+            (true, TickRecord::TISSUE),
+        ];
+        let manifold = &self.bone_step.manifold;
         TickRecord {
             tick: input.tick,
             time_ms: sample.state.time_ms,
@@ -402,15 +437,15 @@ impl HapticStage {
             proxy: self.proxy,
             wrench: wrench.wrench(),
             tissue_force: desired.tissue_within(wrench.force()),
-            contact_normal: if bone.touches() { bone.normal } else { self.tissue.normal },
-            depth_mm: bone.depth_mm,
+            contact_normal: if manifold.touches() { manifold.normal } else { self.tissue.normal },
+            depth_mm: manifold.depth_mm,
             tissue_depth_mm: self.tissue.depth_mm,
-            removed_mm3: self.bone_step.removed_mm3 - back_mm3,
+            removed_mm3: self.bone_step.removed_mm3 - intent.restored_mm3,
             spindle_rpm: self.spindle_rpm(sample.drilling),
             brain_distance_mm: self.brain_distance(sample.state.world_from_tool),
             patch_seq: input.patch_seq,
             compute_us: 0.0,
-            flags: flags.iter().chain(&of_stage).filter(|(on, _)| *on).map(|(_, bit)| bit).sum(),
+            flags: flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum(),
             phase: self.phase() as u8,
             tool: self.tray.slot() as u8,
         }
@@ -441,7 +476,15 @@ impl HapticStage {
     }
 
     /// Raises and clears the warnings.
-    fn warn(&mut self, record: &TickRecord, inputs: WarningInputs, report: &mut dyn FnMut(What)) {
+    fn warn(
+        &mut self,
+        record: &TickRecord,
+        patch: &SurfacePatch,
+        sample: &ToolSample,
+        (bone, desired): (BoneContact, DesiredWrench),
+        report: &mut dyn FnMut(What),
+    ) {
+        let inputs = self.warning_inputs(record, sample, bone.ahead_mm, patch, desired);
         for (warning, present, value) in inputs.causes(record, &self.config.limits) {
             self.watch.update(warning, present, value, record.time_ms).into_iter().for_each(&mut *report);
         }
@@ -454,7 +497,7 @@ impl HapticStage {
         sample: &ToolSample,
         ahead_mm: f32,
         patch: &SurfacePatch,
-        (desired, warm): (DesiredWrench, bool),
+        desired: DesiredWrench,
     ) -> WarningInputs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
@@ -471,7 +514,7 @@ impl HapticStage {
             stalled: record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some(),
             age_ms: (record.time_ms - patch.time_ms) as f32,
             tissue_pace: self.pace.follow(record.time_ms, patch.tissue_ms),
-            warm,
+            warm: self.guard.is_heat_limited(),
         }
     }
 }
