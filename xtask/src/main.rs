@@ -16,6 +16,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
+use std::time::Instant;
 
 /// What is off by default and still checked: the solver on the graphics device.
 const FEATURES: [&str; 2] = ["--features", "trepan-tled/gpu"];
@@ -177,6 +178,7 @@ fn test() -> Result<()> {
 }
 
 /// Nextest where it is installed, for its timeouts and its clear failures; else cargo's own runner.
+/// Examples are compiled by the lints and not linked here.
 fn tests() -> Result<()> {
     let nextest = Command::new("cargo").args(["nextest", "--version"]).output().is_ok_and(|out| out.status.success());
     if nextest {
@@ -185,7 +187,7 @@ fn tests() -> Result<()> {
                 "nextest",
                 "run",
                 "--workspace",
-                "--all-targets",
+                "--tests",
                 FEATURES[0],
                 FEATURES[1],
                 "--no-fail-fast",
@@ -195,7 +197,7 @@ fn tests() -> Result<()> {
             &[],
         )
     } else {
-        cargo(&["test", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet"], &[])
+        cargo(&["test", "--workspace", "--tests", FEATURES[0], FEATURES[1], "--quiet"], &[])
     }
 }
 
@@ -219,6 +221,7 @@ const DRAWS: [&str; 2] = ["PROPTEST_RNG_SEED", "2026"];
 
 fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {
     println!("xtask: cargo {} {}", arguments.join(" "), more.join(" "));
+    let begin = Instant::now();
     let status = Command::new("cargo")
         .args(arguments)
         .args(more)
@@ -227,6 +230,7 @@ fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {
         .current_dir(root())
         .status()
         .with_context(|| format!("cannot start cargo {}", arguments[0]))?;
+    println!("xtask: cargo {} took {:.0} s", arguments[0], begin.elapsed().as_secs_f64());
     if !status.success() {
         bail!("cargo {} failed", arguments[0]);
     }
