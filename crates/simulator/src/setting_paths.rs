@@ -47,7 +47,12 @@ pub(crate) fn expand(words: impl IntoIterator<Item = OsString>) -> Result<Vec<Os
         }
     }
     let is_given = |flag: &str| {
-        let name = flag.split_once('=').map_or(flag, |(name, _)| name);
+        // `--rigid` and `--solver` are ingredients too.
+        let name = match flag.strip_prefix("--set=").map(|key| key.split('=').next().unwrap_or(key)) {
+            Some("rigid" | "rigid-points") => "--rigid",
+            Some("solver") => "--solver",
+            _ => flag.split_once('=').map_or(flag, |(name, _)| name),
+        };
         let same = |word: &str| word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('='));
         name != "--set" && given.iter().any(|word| word.to_str().is_some_and(same))
     };
@@ -168,6 +173,10 @@ mod tests {
         let over = parse("--flap 20 --set friction=0.7");
         let friction = over.given().unwrap().iter().rfind(|given| given.key.name == "friction").unwrap().text.clone();
         assert_eq!((over.flap, over.csf_loss, friction.as_str()), (Some(20.0), Some(0.25), "0.7"));
+        let mut by_flag = Ingredients::of(Quality::Usual);
+        let given = parse("--rigid brute --solver reference").given().unwrap();
+        given.iter().for_each(|given| given.key.set(&mut by_flag, &given.text).unwrap());
+        assert_eq!((by_flag.rigid, by_flag.solver), (Some("brute"), Some("reference")));
     }
 
     #[test]
