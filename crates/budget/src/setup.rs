@@ -1,6 +1,7 @@
-//! The models to choose from for bone, tissue and picture, and the presets.
+//! The models to choose from for bone, tissue and picture, and the presets: files in `presets/`.
 
 use core::fmt;
+use core::str::FromStr;
 
 /// How bone is represented and touched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,19 +64,40 @@ impl Quality {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Auto, Self::Draft, Self::Usual, Self::Fine];
 
+    /// Its file of settings: a path of a recording's header and its value in a line.
+    fn file(self) -> &'static str {
+        match self {
+            Self::Auto => include_str!("../presets/auto.settings"),
+            Self::Draft => include_str!("../presets/draft.settings"),
+            Self::Usual => include_str!("../presets/usual.settings"),
+            Self::Fine => include_str!("../presets/fine.settings"),
+        }
+    }
+
+    /// Its settings: path and value, as in `sizes.tets` and `8000`.
+    pub fn settings(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        self.file().lines().filter(|line| !line.starts_with('#')).filter_map(|line| line.split_once('='))
+    }
+
     /// The setup; `None` for [`Auto`](Self::Auto), which needs a scene and a machine.
     pub fn preset(self) -> Option<Setup> {
-        let setup = |spacing_mm, tets, sparse, detail| Setup {
-            bone: Bone { method: "god-object-sphere", spacing_mm, points: 0 },
-            tissue: Tissue { solver: "tled", tets, halvings: 4 },
-            picture: Picture { sparse, detail },
-        };
-        Some(match self {
-            Self::Auto => return None,
-            Self::Draft => setup(1.5, 3_000, true, 0.5),
-            Self::Usual => setup(1.0, 8_000, false, 1.0),
-            Self::Fine => setup(0.5, 12_000, false, 1.0),
+        Some(Setup {
+            bone: Bone { method: "god-object-sphere", spacing_mm: self.number("sizes.spacing_mm")?, points: 0 },
+            tissue: Tissue {
+                solver: "tled",
+                tets: self.number("sizes.tets")?,
+                halvings: self.number("sizes.halvings")?,
+            },
+            picture: Picture {
+                sparse: self.number("sizes.picture_sparse")?,
+                detail: self.number("sizes.picture_detail")?,
+            },
         })
+    }
+
+    /// Value of a path in its file.
+    fn number<T: FromStr>(self, path: &str) -> Option<T> {
+        self.settings().find(|(name, _)| *name == path)?.1.parse().ok()
     }
 
     /// Its name on the command line.

@@ -18,9 +18,6 @@ pub struct Key {
     pub about: &'static str,
     /// Value of a session without `--set`; `None` where `--quality` chooses.
     pub usual: Option<&'static str>,
-    /// Values of qualities that differ from it: most change about the tolerance or more in the
-    /// built-in operation, and run in time (`validate ablation`).
-    pub presets: &'static [(Quality, &'static str)],
     /// Why no quality takes another value than the default, though one changes more or realism asks
     /// for it.
     pub left_out: Option<&'static str>,
@@ -114,7 +111,6 @@ pub const KEYS: &[Key] = &[
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction on bone of a tool that does not cut",
         usual: Some("off"),
-        presets: &[(Quality::Auto, FRICTION_ON_BONE), (Quality::Fine, FRICTION_ON_BONE)],
         compared: || vec![FRICTION_ON_BONE.into()],
         realistic: Some(FRICTION_ON_BONE),
         get: |i| Some(off_or(i.bone_friction)),
@@ -183,7 +179,6 @@ pub const KEYS: &[Key] = &[
         values: names::<Element>,
         about: "tetrahedra; locking-free: averaged nodal pressure (Joldes et al. 2009)",
         usual: Some("plain"),
-        presets: &[(Quality::Auto, "locking-free"), (Quality::Fine, "locking-free")],
         compared: others::<Element>,
         realistic: Some("locking-free"),
         get: |i| Some(name(&i.element)),
@@ -198,7 +193,6 @@ pub const KEYS: &[Key] = &[
         about: "constitutive law at the same moduli; stiffening: fitted to human brain by region; without CLASS of \
                 all tissue, not of the ventricles' fluid",
         usual: Some("neo-hookean"),
-        presets: &[(Quality::Auto, FITTED), (Quality::Fine, FITTED)],
         compared: || others::<Law>().into_iter().rev().collect(),
         realistic: Some(FITTED),
         get: |i| Some(laws(&i.laws)),
@@ -210,7 +204,6 @@ pub const KEYS: &[Key] = &[
         values: || "off, on, or a shear stiffness up to 1 N/mm".into(),
         about: "membrane in tension on the brain's surface; on: human, published, at small strain",
         usual: Some("off"),
-        presets: &[(Quality::Auto, "on"), (Quality::Fine, "on")],
         compared: on,
         realistic: Some("on"),
         get: |i| Some(off_or(i.pia_arachnoid_n_per_mm)),
@@ -226,7 +219,6 @@ pub const KEYS: &[Key] = &[
         about: "stress relaxation; prony: two terms of swine (Miller and Chinzei 2002); solid-and-fluid: three, \
                 fitted over 4 minutes",
         usual: Some("off"),
-        presets: &[(Quality::Auto, "solid-and-fluid"), (Quality::Fine, "solid-and-fluid")],
         compared: || others::<Relaxation>().into_iter().rev().collect(),
         realistic: Some("solid-and-fluid"),
         get: |i| Some(name(&i.relaxation)),
@@ -239,7 +231,6 @@ pub const KEYS: &[Key] = &[
         about: "where the solver runs; gpu: on a graphics card, else on the processor with a remark; \
                 fastest: on the faster of both",
         usual: Some("cpu"),
-        presets: &[(Quality::Auto, "fastest")],
         compared: others::<SolverDevice>,
         effect: |_| Effect::Rounding,
         get: |i| Some(name(&i.device)),
@@ -287,7 +278,6 @@ pub const KEYS: &[Key] = &[
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction of the first hand's tool on tissue, felt and dragging the tissue",
         usual: Some("off"),
-        presets: &[(Quality::Auto, FRICTION_ON_TISSUE), (Quality::Fine, FRICTION_ON_TISSUE)],
         compared: || vec![FRICTION_ON_TISSUE.into()],
         realistic: Some(FRICTION_ON_TISSUE),
         get: |i| Some(off_or(i.friction)),
@@ -311,7 +301,6 @@ pub const KEYS: &[Key] = &[
         values: names::<Support>,
         about: "what holds the brain in the skull; anchored: stem, arachnoid, falx, bridging veins, fluid that drains",
         usual: Some("base"),
-        presets: &[(Quality::Auto, "anchored"), (Quality::Fine, "anchored")],
         compared: others::<Support>,
         realistic: Some("anchored"),
         get: |i| Some(name(&i.support)),
@@ -339,7 +328,6 @@ impl Key {
             values: String::new,
             about: "",
             usual: None,
-            presets: &[],
             left_out: None,
             part,
             compared: Vec::new,
@@ -370,15 +358,16 @@ impl Key {
         self.usual.is_none() && text == BY_QUALITY
     }
 
-    /// Value of a quality, where it does not depend on machine and case.
-    fn in_quality(&self, quality: Quality) -> Option<&'static str> {
-        self.presets.iter().find(|(preset, _)| *preset == quality).map(|(_, text)| *text).or(self.usual)
+    /// Value in the file of a quality's settings, where it has one.
+    pub(super) fn in_quality(&self, quality: Quality) -> Option<&'static str> {
+        let is_own = |path: &str| path.strip_prefix("ingredients.") == Some(self.name);
+        quality.settings().find(|(path, _)| is_own(path)).map(|(_, value)| value)
     }
 
     /// Default value, in words.
     fn default_text(&self) -> String {
-        let presets = self.presets.iter().map(|(quality, text)| format!("; {}: {text}", quality.name()));
-        self.usual.unwrap_or(BY_QUALITY).to_string() + &presets.collect::<String>()
+        let of = |quality: Quality| Some(format!("; {}: {}", quality.name(), self.in_quality(quality)?));
+        self.usual.unwrap_or(BY_QUALITY).to_string() + &Quality::ALL.into_iter().filter_map(of).collect::<String>()
     }
 }
 
@@ -389,7 +378,7 @@ impl Ingredients {
     /// Ingredients of a quality.
     pub fn of(quality: Quality) -> Self {
         let mut made = Self::default();
-        for (key, text) in KEYS.iter().filter_map(|key| Some((key, key.in_quality(quality)?))) {
+        for (key, text) in KEYS.iter().filter_map(|key| Some((key, key.in_quality(quality).or(key.usual)?))) {
             let set = key.set(&mut made, text);
             debug_assert_eq!(set, Ok(()), "{}", key.name);
         }
@@ -628,10 +617,22 @@ mod tests {
         let all = Quality::ALL.map(Ingredients::of);
         let auto = Ingredients { device: SolverDevice::Fastest, ..matters.clone() };
         assert_eq!(all, [auto, Ingredients::default(), Ingredients::default(), matters]);
-        let fine = Key { usual: Some("plain"), presets: &[(Quality::Fine, "locking-free")], ..Key::of(Part::Tled) };
-        assert_eq!(fine.in_quality(Quality::Fine), Some("locking-free"));
-        assert_eq!(fine.in_quality(Quality::Draft), Some("plain"));
-        assert_eq!(fine.default_text(), "plain; fine: locking-free");
+        let element = Key::named("element").unwrap();
+        assert_eq!(
+            (element.in_quality(Quality::Fine), element.in_quality(Quality::Draft)),
+            (Some("locking-free"), None)
+        );
+        assert_eq!(element.default_text(), "plain; auto: locking-free; fine: locking-free");
+    }
+
+    #[test]
+    fn every_setting_of_a_preset_is_a_size_or_an_ingredient() {
+        for (path, value) in Quality::ALL.into_iter().flat_map(Quality::settings) {
+            match path.strip_prefix("ingredients.") {
+                Some(key) => assert!(setting(&format!("{key}={value}")).unwrap().is_some()),
+                None => assert!(path.starts_with("sizes."), "{path}"),
+            }
+        }
     }
 
     #[test]

@@ -45,8 +45,8 @@ pub fn variants() -> Vec<Variant> {
 /// The values by which a quality differs from the usual, whatever the machine.
 pub fn of_quality(quality: Quality) -> Vec<Variant> {
     let of_key = |key: &'static Key| {
-        let (_, value) = key.presets.iter().find(|(preset, _)| *preset == quality)?;
-        Some(Variant { key: key.name, value: (*value).into(), effect: (key.effect)(value) })
+        let value = key.in_quality(quality)?;
+        Some(Variant { key: key.name, value: value.into(), effect: (key.effect)(value) })
     };
     KEYS.iter().filter_map(of_key).filter(|variant| variant.effect == Effect::Model).collect()
 }
