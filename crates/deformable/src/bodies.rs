@@ -129,8 +129,16 @@ impl MeshCollision {
     fn test_pairs(&mut self, other: &[Vec3]) {
         let still = ToolState::at(Pose::IDENTITY);
         let (tets, points) = (&self.tets[..], &self.points[..]);
-        let scene =
-            Scene { positions: other, velocities: &[], tets, neighbours: &[], points, tool: &still, radius_mm: 0.0 };
+        let scene = Scene {
+            positions: other,
+            velocities: &[],
+            tets,
+            neighbours: &[],
+            points,
+            tool: &still,
+            radius_mm: 0.0,
+            live: &[],
+        };
         for &[point, tet] in &self.pairs {
             let i = point as usize;
             let own = self.itself && tets[tet as usize].contains(&self.nodes[i]);

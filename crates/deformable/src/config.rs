@@ -73,6 +73,12 @@ pub enum ConfigError {
         /// How many there are.
         nodes: usize,
     },
+    /// Tetrahedra are to be taken away under a search that keeps a border of its own.
+    #[error("{search} keeps the border that the mesh has at first; take walk where tissue is to be removed")]
+    FixedBorder {
+        /// The search.
+        search: &'static str,
+    },
     /// A node is nowhere.
     #[error("node {node} lies at {position}; every coordinate at rest must be finite")]
     NonFinite {

@@ -67,10 +67,13 @@ impl Hits {
     }
 
     /// Tests point `i` against a tetrahedron and keeps it when inside. Returns the coordinates for
-    /// a walk.
+    /// a walk; none from a tetrahedron that was taken away.
     #[inline]
     pub fn test(&mut self, scene: &Scene, i: usize, tet: u32) -> Option<[f64; 4]> {
         self.tests += 1;
+        if !scene.is_live(tet) {
+            return None;
+        }
         let slot = &mut self.frames[tet as usize % FRAMES];
         if slot.0 != tet {
             *slot = (tet, Frame::of(scene.corners(tet)));

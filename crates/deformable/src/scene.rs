@@ -19,6 +19,8 @@ pub struct Scene<'a> {
     pub tool: &'a ToolState,
     /// Radius of the ball, mm.
     pub radius_mm: f32,
+    /// Whether each tetrahedron is still there; empty where none is ever taken away.
+    pub live: &'a [bool],
 }
 
 impl Scene<'_> {
@@ -26,6 +28,12 @@ impl Scene<'_> {
     #[inline]
     pub fn corners(&self, tet: u32) -> [Vec3; 4] {
         self.tets[tet as usize].map(|node| self.positions[node as usize])
+    }
+
+    /// Whether a tetrahedron is still there.
+    #[inline]
+    pub fn is_live(&self, tet: u32) -> bool {
+        self.live.get(tet as usize).is_none_or(|live| *live)
     }
 
     /// Box of the ball.

@@ -1,7 +1,7 @@
 //! One collision step, readable as a list: place the points, fit the surface, find, respond.
 
 use crate::config::{Config, ConfigError};
-use crate::method::Response;
+use crate::method::{Method, Response};
 use crate::narrow::{Hits, NONE};
 use crate::outcome::TissueStep;
 use crate::response::responder;
@@ -15,7 +15,8 @@ use trepan_mesh::{TetMesh, Topology};
 
 /// Tests one ball-tipped tool against one moving tetrahedral mesh.
 ///
-/// Everything is allocated in [`new`](Self::new); the mesh's connections are fixed, its nodes move.
+/// Everything is allocated in [`new`](Self::new) and [`resectable`](Self::resectable); nodes move,
+/// and tetrahedra may be taken away.
 pub struct TissueCollision {
     tets: Vec<[u32; 4]>,
     neighbours: Vec<[u32; 4]>,
@@ -27,9 +28,12 @@ pub struct TissueCollision {
     search: Box<dyn Search>,
     responder: Box<dyn Respond>,
     uses_surface: bool,
+    method: Method,
     hits: Hits,
     spring: Spring,
     foundation: Option<Foundation>,
+    /// Whether each tetrahedron is still there; empty where none can be taken away.
+    live: Vec<bool>,
 }
 
 impl TissueCollision {
@@ -60,11 +64,42 @@ impl TissueCollision {
             search: (method.build)(&SearchInputs { mesh, points: count, cell_mm }),
             uses_surface: responder.needs_surface() || method.uses_surface,
             responder,
+            method: config.method,
             hits: Hits::with_points(count),
             shell,
             spring,
             foundation: (response == Response::Ball).then(foundation),
+            live: Vec::new(),
         })
+    }
+
+    /// Makes room for taking tetrahedra away, 18 bytes for each and 80 for each of their faces.
+    ///
+    /// # Errors
+    /// For a search that is not of this crate: it may keep a border of its own.
+    pub fn resectable(mut self, mesh: &TetMesh, may_go: impl Fn(u32) -> bool) -> Result<Self, ConfigError> {
+        if !Method::OWN.contains(&self.method) {
+            return Err(ConfigError::FixedBorder { search: self.method.name() });
+        }
+        self.surface = MovingSurface::resectable(mesh, &self.neighbours, may_go);
+        self.live = vec![true; mesh.tets.len()];
+        Ok(self)
+    }
+
+    /// Takes a tetrahedron away: from the next step on its faces are border. Nothing happens to one
+    /// that [`resectable`](Self::resectable) did not name.
+    pub fn remove(&mut self, tet: u32) {
+        if !self.surface.may_go(tet) || !std::mem::take(&mut self.live[tet as usize]) {
+            return;
+        }
+        for (face, next) in std::mem::replace(&mut self.neighbours[tet as usize], [NONE; 4]).into_iter().enumerate() {
+            self.surface.cover(tet, face);
+            if next != NONE {
+                let back = self.neighbours[next as usize].iter().position(|&n| n == tet).unwrap_or_default();
+                self.neighbours[next as usize][back] = NONE;
+                self.surface.expose(next, back);
+            }
+        }
     }
 
     /// One step: where the tissue's nodes are now (mm, mm/ms), where the tool is, what touches.
@@ -84,7 +119,8 @@ impl TissueCollision {
             self.surface.refit(positions, Aabb::of_sphere(tool.tip(), reach).into());
         }
         let (tets, neighbours, points) = (&self.tets[..], &self.neighbours[..], &self.points[..]);
-        let scene = Scene { positions, velocities, tets, neighbours, points, tool, radius_mm: self.radius_mm };
+        let (radius_mm, live) = (self.radius_mm, &self.live[..]);
+        let scene = Scene { positions, velocities, tets, neighbours, points, tool, radius_mm, live };
         self.search.find(&scene, &mut self.surface, &mut self.hits);
         count(&self.hits, out);
         let answer = self.responder.respond(&scene, &self.hits, &mut self.surface, out);

@@ -23,7 +23,7 @@
 use crate::{bounded::push_bounded, extent::Extent, narrow::NONE, triangle};
 use glam::Vec3A;
 use trepan_geometry::Vec3;
-use trepan_mesh::{Csr, Surface, TetMesh};
+use trepan_mesh::{Csr, FACES, Surface, TetMesh};
 
 /// Triangles in one cluster.
 const CLUSTER: usize = 32;
@@ -31,6 +31,8 @@ const CLUSTER: usize = 32;
 const GROUP: usize = 16;
 /// Clusters fitted at every step at least.
 const SLICE: usize = 12;
+/// Time of the fit of a cluster that is no border yet.
+const UNUSED: u32 = u32::MAX;
 /// Motion between two fits of a box that is always allowed for, mm.
 const LEAST_MOTION: f32 = 0.5;
 
@@ -55,6 +57,14 @@ pub struct MovingSurface {
     pub tet_of_triangle: Vec<u32>,
     /// Area of each triangle in the mesh as it was given, mm².
     pub rest_area_mm2: Vec<f32>,
+    /// Whether each triangle is border now.
+    pub live: Vec<bool>,
+    /// Triangle of each face of each tetrahedron, or [`NONE`]; empty where nothing can be removed.
+    triangle_of_face: Vec<[u32; 4]>,
+    may_go: Vec<bool>,
+    /// Clusters that have been border, which alone have a box; those since the last fit.
+    used: Vec<u32>,
+    fresh: Vec<u32>,
     nodes_of_cluster: Csr,
     triangles_of_node: Csr,
     boxes: Vec<Extent>,
@@ -74,8 +84,67 @@ pub struct MovingSurface {
 
 impl MovingSurface {
     pub(crate) fn of(mesh: &TetMesh) -> Self {
-        let surface = Surface::of(mesh);
-        let order = along_morton_curve(mesh, &surface);
+        Self::over(mesh, &Surface::of(mesh), &[])
+    }
+
+    /// The border of a mesh of which some tetrahedra may be removed: the faces behind which they
+    /// lie are listed from the start.
+    pub(crate) fn resectable(mesh: &TetMesh, neighbours: &[[u32; 4]], may_go: impl Fn(u32) -> bool) -> Self {
+        let mut faces = Surface::default();
+        let (mut live, mut order) = (Vec::new(), Vec::new());
+        for (tet, next) in neighbours.iter().enumerate() {
+            for face in (0..4).filter(|&face| next[face] == NONE || may_go(next[face])) {
+                faces.triangles.push(FACES[face].map(|corner| mesh.tets[tet][corner]));
+                faces.tet_of_triangle.push(tet as u32);
+                live.push(next[face] == NONE);
+                order.push([tet as u32, face as u32]);
+            }
+        }
+        let mut surface = Self::over(mesh, &faces, &live);
+        surface.used.reserve(surface.boxes.len());
+        surface.fresh.reserve(surface.boxes.len());
+        surface.may_go = (0..mesh.tets.len() as u32).map(may_go).collect();
+        surface.triangle_of_face = vec![[NONE; 4]; mesh.tets.len()];
+        for (triangle, &number) in along_morton_curve(mesh, &faces).iter().enumerate() {
+            let [tet, face] = order[number as usize];
+            surface.triangle_of_face[tet as usize][face as usize] = triangle as u32;
+        }
+        surface
+    }
+
+    /// Whether a tetrahedron may be removed.
+    pub(crate) fn may_go(&self, tet: u32) -> bool {
+        self.may_go.get(tet as usize).is_some_and(|may_go| *may_go)
+    }
+
+    /// A face is border no more.
+    pub(crate) fn cover(&mut self, tet: u32, face: usize) {
+        if let Some(live) = self.live.get_mut(self.triangle_of_face[tet as usize][face] as usize) {
+            *live = false;
+        }
+    }
+
+    /// A face becomes border; its cluster is fitted in the next step.
+    pub(crate) fn expose(&mut self, tet: u32, face: usize) {
+        let triangle = self.triangle_of_face[tet as usize][face];
+        let Some(live) = self.live.get_mut(triangle as usize) else { return };
+        *live = true;
+        let cluster = triangle / CLUSTER as u32;
+        if !self.is_used(cluster as usize) {
+            self.used.push(cluster);
+            self.fresh.push(cluster);
+            self.fitted_at[cluster as usize] = 0;
+        }
+    }
+
+    /// Whether a cluster has been border.
+    fn is_used(&self, cluster: usize) -> bool {
+        self.fitted_at[cluster] != UNUSED
+    }
+
+    /// Clusters of triangles; all of them are border unless `live` says which.
+    fn over(mesh: &TetMesh, surface: &Surface, live: &[bool]) -> Self {
+        let order = along_morton_curve(mesh, surface);
         let triangles: Vec<_> = order.iter().map(|&t| surface.triangles[t as usize]).collect();
         let tet_of_triangle = order.iter().map(|&t| surface.tet_of_triangle[t as usize]).collect();
         let area = |corners: [Vec3; 3]| 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
@@ -84,16 +153,24 @@ impl MovingSurface {
         let nodes_of_cluster =
             distinct_rows(triangles.chunks(CLUSTER).map(|cluster| cluster.iter().flatten().copied()));
         let clusters = nodes_of_cluster.len();
+        let live: Vec<bool> = order.iter().map(|&t| live.get(t as usize).is_none_or(|live| *live)).collect();
         Self {
             triangles_of_node: Csr::of_pairs(mesh.positions.len(), around),
             boxes: vec![Extent::EMPTY; clusters],
             groups: vec![Extent::EMPTY; clusters.div_ceil(GROUP)],
-            fitted_at: vec![0; clusters],
+            fitted_at: live.chunks(CLUSTER).map(|c| if c.contains(&true) { 0 } else { UNUSED }).collect(),
             step: 0,
             motion: LEAST_MOTION,
             region: Extent::EMPTY,
             here: Vec::with_capacity(triangles.len()),
             stale: 0,
+            used: (0..clusters as u32)
+                .filter(|c| live[*c as usize * CLUSTER..].iter().take(CLUSTER).any(|l| *l))
+                .collect(),
+            fresh: Vec::new(),
+            may_go: Vec::new(),
+            triangle_of_face: Vec::new(),
+            live,
             nodes_of_cluster,
             triangles,
             tet_of_triangle,
@@ -113,11 +190,14 @@ impl MovingSurface {
         if self.step == u32::MAX {
             self.reset();
         }
-        let turns = if self.step == 0 { 1 } else { self.boxes.len().div_ceil(SLICE).max(1) };
+        let turns = if self.step == 0 { 1 } else { self.used.len().div_ceil(SLICE).max(1) };
         self.step += 1;
         (self.stale, self.motion) = (0, LEAST_MOTION.max(0.9 * self.motion));
-        for cluster in (self.step as usize % turns..self.boxes.len()).step_by(turns) {
-            self.fit(positions, cluster);
+        for at in (self.step as usize % turns..self.used.len()).step_by(turns) {
+            self.fit(positions, self.used[at] as usize);
+        }
+        while let Some(cluster) = self.fresh.pop() {
+            self.fitted(positions, cluster as usize);
         }
         self.tighten(self.step as usize % self.groups.len().max(1));
         (self.region, self.bounds) = (region, Extent::EMPTY);
@@ -126,7 +206,7 @@ impl MovingSurface {
         self.here.clear();
         for group in 0..self.groups.len() {
             for cluster in self.clusters_near(group, &region) {
-                if self.loose(cluster).overlaps(&region) && self.fitted(positions, cluster).overlaps(&region) {
+                if self.is_near(positions, cluster, &region) {
                     self.list_here(positions, cluster);
                 }
             }
@@ -139,6 +219,13 @@ impl MovingSurface {
             true => group * GROUP..((group + 1) * GROUP).min(self.boxes.len()),
             false => 0..0,
         }
+    }
+
+    /// Whether a cluster's box, fitted in this step, meets a region.
+    fn is_near(&mut self, positions: &[Vec3], cluster: usize, region: &Extent) -> bool {
+        self.is_used(cluster)
+            && self.loose(cluster).overlaps(region)
+            && self.fitted(positions, cluster).overlaps(region)
     }
 
     /// Takes a group's box from its clusters anew; between such turns it only grows.
@@ -171,7 +258,7 @@ impl MovingSurface {
         }
         for group in 0..self.groups.len() {
             for cluster in self.clusters_near(group, region) {
-                if self.loose(cluster).overlaps(region) && self.fitted(positions, cluster).overlaps(region) {
+                if self.is_near(positions, cluster, region) {
                     let met = |t: &u32| self.box_of(positions, *t).overlaps(region);
                     self.triangles_of(cluster).filter(met).for_each(&mut take);
                 }
@@ -180,11 +267,11 @@ impl MovingSurface {
         overflow
     }
 
-    /// Box of a triangle; empty when a corner is not finite.
+    /// Box of a triangle; empty when a corner is not finite, or it is no border.
     #[inline]
     fn box_of(&self, positions: &[Vec3], t: u32) -> Extent {
         let [a, b, c] = self.corners(positions, t).map(Vec3A::from);
-        match (a + b + c).is_finite() {
+        match self.live[t as usize] && (a + b + c).is_finite() {
             true => Extent { low: a.min(b).min(c), high: a.max(b).max(c) },
             false => Extent::EMPTY,
         }
@@ -209,14 +296,15 @@ impl MovingSurface {
         let (mut first, mut nearest) = (None, f32::INFINITY);
         for cluster in 0..self.boxes.len() {
             let distance2 = self.loose(cluster).distance2(to);
-            if distance2 < nearest {
+            if distance2 < nearest && self.is_used(cluster) {
                 (first, nearest) = (Some(cluster), distance2);
             }
         }
         let mut best = self.closest_among(positions, self.triangles_of(first?), to, None);
         for cluster in 0..self.boxes.len() {
             let bound = best.map_or(f32::INFINITY, |b| b.distance2);
-            if self.loose(cluster).distance2(to) < bound && self.fitted(positions, cluster).distance2(to) < bound {
+            let may_be_nearer = self.is_used(cluster) && self.loose(cluster).distance2(to) < bound;
+            if may_be_nearer && self.fitted(positions, cluster).distance2(to) < bound {
                 best = self.closest_among(positions, self.triangles_of(cluster), to, best);
             }
         }
@@ -231,7 +319,7 @@ impl MovingSurface {
         to: Vec3,
         best: Option<Foot>,
     ) -> Option<Foot> {
-        among.fold(best, |best, t| {
+        among.filter(|&t| self.live[t as usize]).fold(best, |best, t| {
             let foot = self.foot(positions, t, to);
             match best {
                 Some(b) if b.distance2 <= foot.distance2 => Some(b),
@@ -296,7 +384,7 @@ impl MovingSurface {
         for &n in self.nodes_of_cluster.row(cluster) {
             fitted.grow(positions[n as usize]);
         }
-        if self.step > 1 {
+        if self.step > 1 && self.fitted_at[cluster] > 0 {
             let moved = fitted.moved_from(&self.boxes[cluster]);
             self.stale += u32::from(moved > 2.0 * self.motion && self.step - self.fitted_at[cluster] > 1);
             self.motion = self.motion.max(moved);

@@ -22,7 +22,7 @@ use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
 use trepan_soft::simd::{Lane, NODES, Quad, WIDTH};
 use trepan_soft::simd::{Pass, PassReport};
-use trepan_soft::{Material, Shape, element_omega2};
+use trepan_soft::{Law, Material, Shape, element_omega2};
 
 /// Sixteen tetrahedra with K material constants each. Unused lanes have zero stiffness and add zero
 /// to node 0.
@@ -127,6 +127,16 @@ impl<const K: usize> Block<K> {
         self.quarter_volume[lane] = (0.25 * shape.volume_mm3) as f32;
         for corner in 0..4 {
             self.nodes[corner][lane] = nodes[corner];
+        }
+    }
+
+    /// Leaves an element this volume, mm³; without any it does not deform either.
+    pub fn fill<M: Constitutive<K>>(&mut self, lane: usize, law: &Law, volume_mm3: f64) {
+        let constants = M::constants(law, volume_mm3);
+        self.constants.iter_mut().zip(constants).for_each(|(row, constant)| row[lane] = constant);
+        self.quarter_volume[lane] = (0.25 * volume_mm3) as f32;
+        if volume_mm3 == 0.0 {
+            self.gradients.as_flattened_mut().iter_mut().for_each(|row| row[lane] = 0.0);
         }
     }
 

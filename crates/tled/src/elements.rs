@@ -2,6 +2,7 @@
 
 use crate::config::Config;
 use crate::dynamic_scaling::DynamicScaling;
+use crate::fill::{Fills, RAMP_STEPS};
 use crate::force_slots::ForceSlots;
 use crate::node_groups::NodeGroups;
 use crate::nodes::{Nodes, Update};
@@ -28,6 +29,7 @@ pub(crate) struct Elements {
     relaxation: Relaxation,
     dynamic: DynamicScaling,
     still_mm: f32,
+    pub fills: Fills,
 }
 
 impl Elements {
@@ -64,12 +66,42 @@ impl Elements {
             of_tets.map(|(tets, groups)| Part::of(body, scaling, tets, &groups_of, groups, config)).collect();
         parts.extend(sheets.iter().zip(of_parts).map(|(sheet, groups)| Part::of_sheet(body, sheet, &group_at, groups)));
         Self {
+            fills: Fills::full(body, &tets_of, &sheets, node_groups),
             team: Team::of(parts, nodes, force_slots, config.kernel.resolved(), config.threads),
             averaged_pressure: config.averaged_pressure,
             relaxation: config.relaxation,
             dynamic,
             still_mm: config.still_mm,
         }
+    }
+
+    /// Lets every fill above its goal fall by a step.
+    pub fn fall(&mut self, body: &Body, layout: &Layout) {
+        let (fills, team) = (&mut self.fills, &self.team);
+        if fills.falling.is_empty() {
+            return;
+        }
+        let mut falling = std::mem::take(&mut fills.falling);
+        for &tet in &falling {
+            let filling = fills.fall(tet);
+            team.fill(fills.indices[tet as usize], body, tet, filling);
+            fills.triangles_on(tet).for_each(|(triangle, index)| team.fill(index, body, triangle, filling));
+        }
+        for node in falling.iter().flat_map(|&tet| body.mesh.tets[tet as usize]) {
+            team.nodes().set_weight(layout.place_of[node as usize] as usize, fills.grams(body, node));
+            if self.averaged_pressure {
+                let volumes = fills.volumes(body, layout, node);
+                volumes.for_each(|(group, mm3)| team.force_slots().set_volume(group, mm3));
+            }
+        }
+        falling.retain(|&tet| fills.is_falling(tet));
+        fills.falling = falling;
+    }
+
+    /// Takes lower fills at once.
+    pub fn empty_to(&mut self, fills: &[u16], body: &Body, layout: &Layout) {
+        (0u32..).zip(fills).for_each(|(tet, &fill)| self.fills.lower(tet, fill));
+        (0..RAMP_STEPS).for_each(|_| self.fall(body, layout));
     }
 
     /// The nodes.
@@ -233,10 +265,11 @@ mod tests {
             elements.weigh(true);
             let masses: Vec<f32> =
                 (0..count).map(|place| elements.nodes().present_inverse_mass(place, &free)).collect();
-            assert!(masses != elements.nodes().inverse_mass);
+            assert!((0..count).any(|n| masses[n] != elements.nodes().inverse_mass.get(n)));
             elements.weigh(false);
             assert!(
-                (0..count).all(|n| elements.nodes().present_inverse_mass(n, &free) == elements.nodes().inverse_mass[n])
+                (0..count)
+                    .all(|n| elements.nodes().present_inverse_mass(n, &free) == elements.nodes().inverse_mass.get(n))
             );
             (report, masses, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };

@@ -44,6 +44,14 @@ impl Field {
 }
 
 impl Scalars {
+    pub fn of(values: &[f32]) -> Self {
+        Self(values.iter().map(|value| AtomicU32::new(value.to_bits())).collect())
+    }
+
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
     pub fn zeroed(len: usize) -> Self {
         Self((0..len).map(|_| AtomicU32::default()).collect())
     }

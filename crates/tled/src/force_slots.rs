@@ -23,7 +23,7 @@ pub(crate) struct ForceSlots {
     pub shares: Scalars,
     /// By group: mean `J - 1` of its elements.
     pub volume_change: Scalars,
-    inverse_volume: Vec<f32>,
+    inverse_volume: Scalars,
     runs: Runs,
 }
 
@@ -43,7 +43,7 @@ impl ForceSlots {
             sums: Field::zeroed(runs.slots.len()),
             shares: Scalars::zeroed(if inverse_volume.is_empty() { 0 } else { runs.slots.len() }),
             volume_change: Scalars::zeroed(inverse_volume.len()),
-            inverse_volume,
+            inverse_volume: Scalars::of(&inverse_volume),
             runs,
         };
         (force_slots, slots)
@@ -61,12 +61,17 @@ impl ForceSlots {
         self.inverse_volume.len()
     }
 
+    /// Sets the volume of a node group, mm³; nothing is averaged over an empty one.
+    pub fn set_volume(&self, group: usize, volume_mm3: f64) {
+        self.inverse_volume.set(group, if volume_mm3 > 0.0 { (1.0 / volume_mm3) as f32 } else { 0.0 });
+    }
+
     /// Averages the volume change of some node groups.
     pub fn average(&self, node_groups: Range<usize>) {
         for group in node_groups {
             let slots = self.runs.of_groups[group] as usize..self.runs.of_groups[group + 1] as usize;
             let sum = slots.fold(0.0, |sum, slot| sum + self.shares.get(slot));
-            self.volume_change.set(group, sum * self.inverse_volume[group]);
+            self.volume_change.set(group, sum * self.inverse_volume.get(group));
         }
     }
 }

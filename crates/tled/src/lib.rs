@@ -48,6 +48,7 @@ mod dynamic_scaling;
 mod element;
 mod elements;
 mod field;
+mod fill;
 mod force_slots;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -66,6 +67,7 @@ mod team;
 mod tled;
 
 pub use config::{Config, Damping};
+pub use fill::{FULL, RAMP_STEPS};
 pub use relaxation::{PRONY_TERMS, Relaxation};
 pub use settle::{Settled, Settling};
 pub use tled::{Pass, Tled};

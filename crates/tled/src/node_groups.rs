@@ -58,6 +58,16 @@ impl NodeGroups {
         })
     }
 
+    /// The node groups at a place.
+    pub fn all_at(&self, place: u32) -> std::ops::Range<usize> {
+        self.place_of.partition_point(|&p| p < place)..self.place_of.partition_point(|&p| p <= place)
+    }
+
+    /// Whether a tetrahedron at a group's node belongs to it.
+    pub fn has(&self, group: usize, body: &Body, tet: u32) -> bool {
+        self.bulk_of[group] == self.bulk_groups[usize::from(body.material_of_tet[tet as usize])]
+    }
+
     /// One of the node groups at a place.
     pub fn any_at(&self, place: u32) -> u32 {
         self.place_of.partition_point(|&p| p < place) as u32

@@ -31,12 +31,12 @@ pub(crate) struct Nodes {
     /// parts around stay awake.
     pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
-    pub inverse_mass: Vec<f32>,
+    pub inverse_mass: Scalars,
     /// Mass that stiffened elements add in this step, g; 0 everywhere while `is_heavier` is false.
     added: Scalars,
     is_heavier: AtomicBool,
     /// Share of the mass that has weight (scaled mass has none).
-    weight: Vec<f32>,
+    weight: Scalars,
     rest: Vec<Vec4>,
     /// Anchors; empty where the body has none.
     anchors: Vec<Anchor>,
@@ -155,10 +155,10 @@ impl Nodes {
             external: field(),
             is_pushed: AtomicBool::new(false),
             pushed: Scalars::zeroed(layout.node_at.len()),
-            inverse_mass,
+            inverse_mass: Scalars::of(&inverse_mass),
             added: Scalars::zeroed(layout.node_at.len()),
             is_heavier: AtomicBool::new(false),
-            weight,
+            weight: Scalars::of(&weight),
             rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize].extend(0.0)).collect(),
             anchors: anchors_by_place(body, layout),
             limited: AtomicU32::new(0),
@@ -175,7 +175,7 @@ impl Nodes {
         let flags = self.flags(update);
         for place in places {
             let (u, v) = (self.u.vector(place), self.v.vector(place));
-            if self.inverse_mass[place] == 0.0 {
+            if self.inverse_mass.get(place) == 0.0 {
                 // A fixed node moves with its prescribed velocity.
                 self.u.set(place, (u + v * dt_ms).to_array());
                 self.take_external(place, flags.anything_pushes);
@@ -219,7 +219,7 @@ impl Nodes {
         [keep, gain]: [f32; 2],
         flags: Flags,
     ) -> Option<[Vec4; 2]> {
-        let (inverse_mass, external) = (self.inverse_mass[place], self.take_external(place, flags.anything_pushes));
+        let (inverse_mass, external) = (self.inverse_mass.get(place), self.take_external(place, flags.anything_pushes));
         let lightness = if flags.is_heavier { self.lightness(place) } else { 1.0 };
         let carried = update.carried(self.rest[place] + u, v, keep);
         let opposed = if flags.is_opposed { self.opposed.vector(place) } else { Vec4::ZERO };
@@ -233,7 +233,7 @@ impl Nodes {
         let is_beside_sleepers = force.w > 0.0;
         force.w = 0.0;
         let gravity = update.weight_at(self.rest[place] + u);
-        let pull = (gravity * self.weight[place] + (force + external) * inverse_mass) * lightness;
+        let pull = (gravity * self.weight.get(place) + (force + external) * inverse_mass) * lightness;
         let mut is_pushed = external != Vec4::ZERO;
         if is_beside_sleepers {
             is_pushed |= pull.length() * update.dt_ms * update.dt_ms > update.calm_mm;
@@ -266,7 +266,7 @@ impl Nodes {
         let (keep_and_gain, flags) = (update.keep_and_gain(), self.flags(update));
         for place in places {
             let state = [self.u.vector(place), self.v.vector(place)];
-            let kicked = match self.inverse_mass[place] == 0.0 {
+            let kicked = match self.inverse_mass.get(place) == 0.0 {
                 true => None,
                 false => self.kicked(place, state, force_slots, update, keep_and_gain, flags),
             };
@@ -305,7 +305,7 @@ impl Nodes {
     /// Velocity of a node after a substep under its element force alone, mm/ms. A fixed node keeps
     /// its velocity.
     pub fn free_velocity(&self, place: usize, force: Vec3, update: &Update) -> Vec3 {
-        let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
+        let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass.get(place));
         if inverse_mass == 0.0 {
             return v.truncate();
         }
@@ -313,7 +313,7 @@ impl Nodes {
         let (at, lightness) = (self.rest[place] + u, self.lightness(place));
         let opposed = if self.is_opposed.load(Relaxed) { self.opposed.vector(place) } else { Vec4::ZERO };
         let force = force - opposed.truncate();
-        let pull = update.weight_at(at).truncate() * self.weight[place] + force * inverse_mass;
+        let pull = update.weight_at(at).truncate() * self.weight.get(place) + force * inverse_mass;
         let velocity = update.carried(at, v, keep).truncate() + pull * (lightness * gain);
         match self.anchors.is_empty() {
             true => velocity,
@@ -341,7 +341,7 @@ impl Nodes {
     /// 1/m with the mass that stiffened elements add, 1/g, and less where an anchor holds the node:
     /// what a contact's force changes of [`free_velocity`](Self::free_velocity).
     pub fn present_inverse_mass(&self, place: usize, update: &Update) -> f32 {
-        let inverse_mass = self.inverse_mass[place] * self.lightness(place);
+        let inverse_mass = self.inverse_mass.get(place) * self.lightness(place);
         let Some(anchor) = self.anchors.get(place).filter(|anchor| anchor.along > 0.0) else { return inverse_mass };
         let held = 1.0 - anchor.in_fluid * update.fluid.dryness(self.position(place));
         let [_, gain] = update.keep_and_gain();
@@ -351,7 +351,7 @@ impl Nodes {
     /// A node's mass without over that with what stiffened elements add; 1 for a fixed node.
     #[inline(always)]
     fn lightness(&self, place: usize) -> f32 {
-        1.0 / (1.0 + self.added.get(place) * self.inverse_mass[place])
+        1.0 / (1.0 + self.added.get(place) * self.inverse_mass.get(place))
     }
 
     /// Adds mass to the node at a place, g.
@@ -407,12 +407,20 @@ impl Nodes {
         self.external.set(place, (self.external.vector(place) + force.extend(0.0)).to_array());
     }
 
+    /// Leaves a node this mass with weight, g, and its inertia; without any mass it stops for good.
+    pub fn set_weight(&self, place: usize, grams: Option<f64>) {
+        let inverse_mass = self.inverse_mass.get(place);
+        self.weight.set(place, (grams.unwrap_or(0.0) * f64::from(inverse_mass)) as f32);
+        if grams.is_none() && inverse_mass > 0.0 {
+            self.inverse_mass.set(place, 0.0);
+            self.v.set(place, [0.0; 4]);
+        }
+    }
+
     /// Present rigid motion of the body.
     pub fn rigid_motion(&self) -> RigidMotion {
-        let of = |place: usize| {
-            (1.0 / self.inverse_mass[place].max(f32::MIN_POSITIVE), self.position(place), self.velocity(place))
-        };
-        RigidMotion::of((0..self.u.len()).map(of))
+        let of = |place: usize| (1.0 / self.inverse_mass.get(place), self.position(place), self.velocity(place));
+        RigidMotion::of((0..self.u.len()).filter(|&place| self.inverse_mass.get(place) > 0.0).map(of))
     }
 
     /// Sets a node's displacement, mm, and velocity, mm/ms.
@@ -424,11 +432,11 @@ impl Nodes {
     /// Weight of the node at a place in `gravity`, mm/ms², without scaled mass, and the force of
     /// its anchor, N; zero for a fixed node.
     pub fn force_at_rest(&self, place: usize, gravity: Vec3, fluid: &Fluid) -> Vec3 {
-        if self.inverse_mass[place] == 0.0 {
+        if self.inverse_mass.get(place) == 0.0 {
             return Vec3::ZERO;
         }
         let (u, dryness) = (self.displacement(place), fluid.dryness(self.position(place)));
-        let weight = (gravity + fluid.weight * dryness) * (self.weight[place] / self.inverse_mass[place]);
+        let weight = (gravity + fluid.weight * dryness) * (self.weight.get(place) / self.inverse_mass.get(place));
         let Some(anchor) = self.anchors.get(place) else { return weight };
         let (held, out) = (1.0 - anchor.in_fluid * dryness, anchor.normal * u.dot(anchor.normal));
         let taken = (out * anchor.along + (u - out) * anchor.across) * held;

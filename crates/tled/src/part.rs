@@ -22,6 +22,7 @@
 use crate::block::{Block, Forces, Memory, Strain, Volumes};
 use crate::config::Config;
 use crate::dynamic_scaling::{Added, Borne, DynamicScaling};
+use crate::fill::Filling;
 use crate::force_slots::ForceSlots;
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, Stiffening};
 use crate::nodes::Nodes;
@@ -100,6 +101,8 @@ trait LawElements: Send {
     fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]);
     /// The stress memory.
     fn memory(&mut self) -> &mut [f32];
+    /// Changes the fill of an element; `number` is that of its tetrahedron or triangle.
+    fn fill(&mut self, index: usize, body: &Body, number: u32, filling: Filling);
 }
 
 struct Blocks<M, const K: usize, const T: usize> {
@@ -199,6 +202,12 @@ impl Part {
     /// Number of elements, and number of awake elements.
     pub fn awake(&self) -> [usize; 2] {
         [self.tets, if self.quiet_ms == f32::INFINITY { 0 } else { self.tets }]
+    }
+
+    /// Changes the fill of an element; `number` is that of its tetrahedron or triangle.
+    pub fn fill(&mut self, index: usize, body: &Body, number: u32, filling: Filling) {
+        self.elements.fill(index, body, number, filling);
+        self.wake();
     }
 
     /// Wakes the part.
@@ -318,6 +327,13 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
     fn memory(&mut self) -> &mut [f32] {
         self.memory.as_flattened_mut().as_flattened_mut().as_flattened_mut()
     }
+
+    fn fill(&mut self, index: usize, body: &Body, tet: u32, Filling { share, kept }: Filling) {
+        let (block, lane) = (index % self.blocks.len(), index / self.blocks.len());
+        let volume_mm3 = share * body.mesh.volume_mm3(tet as usize);
+        self.blocks[block].fill::<M>(lane, &body.material(tet as usize).law(), volume_mm3);
+        self.memory[block].as_flattened_mut().iter_mut().for_each(|row| row[lane] *= kept);
+    }
 }
 
 /// Triangles of a membrane.
@@ -339,5 +355,10 @@ impl LawElements for Sheet {
 
     fn memory(&mut self) -> &mut [f32] {
         &mut []
+    }
+
+    fn fill(&mut self, index: usize, body: &Body, triangle: u32, Filling { share, .. }: Filling) {
+        let count = self.0.len();
+        self.0[index % count].fill(index / count, body, triangle, share);
     }
 }

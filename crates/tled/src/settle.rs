@@ -218,7 +218,11 @@ impl Tled {
             .collect();
         let free = |n: u32| {
             let place = place_of[n as usize] as usize;
-            FreeNode { position: nodes.position(place), velocity: Vec3::ZERO, inverse_mass: nodes.inverse_mass[place] }
+            FreeNode {
+                position: nodes.position(place),
+                velocity: Vec3::ZERO,
+                inverse_mass: nodes.inverse_mass.get(place),
+            }
         };
         let still = Gain { dt_ms: 0.0, gain_ms: 0.0 };
         let add = |n: u32, force: Vec3| residual[n as usize] += force.as_dvec3();
@@ -228,7 +232,7 @@ impl Tled {
             |place| nodes.position(place as usize),
             |place, force| residual[node_at[place as usize] as usize] += force.as_dvec3(),
         );
-        let fixed = places().map(|place| nodes.inverse_mass[place] == 0.0);
+        let fixed = places().map(|place| nodes.inverse_mass.get(place) == 0.0);
         residual.iter_mut().zip(fixed).filter(|(_, fixed)| *fixed).for_each(|(r, _)| *r = DVec3::ZERO);
         State { u: rounded.iter().map(|u| u.as_dvec3()).collect(), residual }
     }

@@ -87,6 +87,12 @@ impl Pass for SheetForces<'_> {
 }
 
 impl SheetBlock {
+    /// Leaves a triangle a share of its stiffness.
+    pub fn fill(&mut self, lane: usize, body: &Body, triangle: u32, share: f64) {
+        let area_mm2 = body.membrane.shape(triangle as usize, &body.mesh.positions).area_mm2;
+        self.stiffness[lane] = (share * f64::from(body.membrane.shear_n_per_mm) * area_mm2) as f32;
+    }
+
     /// Forces on corners 1 and 2 from the displacements of all three.
     #[inline(always)]
     fn forces<L: Lane>(&self, part: usize, [o, a, b]: [[L; 3]; 3]) -> [[L; 3]; 2] {

@@ -12,6 +12,7 @@
 //! Workers spin for a few microseconds after a round, then yield, then sleep.
 
 use crate::dynamic_scaling::Added;
+use crate::fill::{Filling, PartIndex};
 use crate::force_slots::ForceSlots;
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, Quiet};
@@ -19,6 +20,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
+use trepan_soft::Body;
 use trepan_soft::simd::Kernel;
 use trepan_soft::simd::PassReport;
 
@@ -119,6 +121,11 @@ impl Team {
         };
         let workers = (1..threads).filter_map(start).collect();
         Self { shared, workers }
+    }
+
+    /// Changes the fill of a tetrahedron, or of a triangle of a membrane, between rounds.
+    pub fn fill(&self, at: PartIndex, body: &Body, number: u32, filling: Filling) {
+        lock(&self.shared.parts[at.part as usize]).fill(at.index as usize, body, number, filling);
     }
 
     /// The nodes.

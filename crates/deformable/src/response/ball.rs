@@ -87,6 +87,9 @@ impl Ball {
         let inside = hits.tet[scene.centre()] != NONE;
         let jumped = self.last_centre.distance(centre) > scene.radius_mm;
         self.last_centre = centre;
+        if self.anchor != NONE && !surface.live[self.anchor as usize] {
+            self.anchor = NONE;
+        }
         let foot = match (inside, self.anchor) {
             (false, _) => surface.closest_here(positions, centre, scene.radius_mm),
             (true, NONE) => surface.closest(positions, centre),

@@ -57,7 +57,7 @@ impl Degenerate {
         let is_known = &mut self.is_known;
         self.known.retain_mut(|(tet, bounds)| {
             *bounds = passage(scene, *tet);
-            is_known[*tet as usize] = !is_sound(scene.corners(*tet));
+            is_known[*tet as usize] = scene.is_live(*tet) && !is_sound(scene.corners(*tet));
             is_known[*tet as usize]
         });
         let count = self.is_known.len() as u32;
@@ -76,7 +76,7 @@ impl Degenerate {
 
     /// Says whether this one is newly found to be degenerate.
     fn look(&mut self, scene: &Scene, tet: u32) -> bool {
-        if self.is_known[tet as usize] || is_sound(scene.corners(tet)) {
+        if self.is_known[tet as usize] || !scene.is_live(tet) || is_sound(scene.corners(tet)) {
             return false;
         }
         if self.known.len() == self.known.capacity() {

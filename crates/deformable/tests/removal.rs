@@ -1,0 +1,93 @@
+//! Tetrahedra that are taken away while a tool touches them.
+
+mod common;
+
+use trepan_deformable::{Config, Method, Response, TissueCollision, TissueStep};
+use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_mesh::TetMesh;
+
+const EDGE_MM: f32 = 24.0;
+
+/// A cube of `cells³` split cubes.
+fn cube(cells: usize) -> TetMesh {
+    common::block([cells; 3], EDGE_MM / cells as f32)
+}
+
+fn centre(mesh: &TetMesh, tet: u32) -> Vec3 {
+    mesh.corners(tet as usize).into_iter().sum::<Vec3>() / 4.0
+}
+
+fn collision(mesh: &TetMesh, method: &str, may_go: impl Fn(u32) -> bool) -> TissueCollision {
+    let method = Method::OWN.into_iter().find(|own| own.name() == method).expect("its own");
+    let config = Config { method, response: Some(Response::Ball), ..Config::default() };
+    let plain = TissueCollision::new(mesh, &Tool::probe(3.0), &config).expect("a sound mesh");
+    plain.resectable(mesh, may_go).expect("a search of this crate")
+}
+
+/// Depth, force on the hand and sum of the areas of the springs.
+fn felt(step: &TissueStep) -> [f32; 5] {
+    let force = step.patch.normal * step.patch.force_n;
+    [step.manifold.depth_mm, force.x, force.y, force.z, step.surface_springs.iter().map(|s| s.stiffness).sum()]
+}
+
+fn alike(a: [f32; 5], b: [f32; 5]) -> bool {
+    a.into_iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-4 * (1.0 + a.abs().max(b.abs())))
+}
+
+/// A tool that goes down into a hole that is made before it, over waves in the tissue.
+#[test]
+fn a_hole_is_felt_as_in_the_mesh_without_it_by_every_search() {
+    let mesh = cube(8);
+    let count = mesh.tets.len() as u32;
+    let may_go = |t: u32| centre(&mesh, t).distance(Vec3::new(12.0, 12.0, EDGE_MM)) < 11.0;
+    let mut all: Vec<(&str, TissueCollision)> =
+        ["walk", "brute", "uniform-grid"].into_iter().map(|name| (name, collision(&mesh, name, may_go))).collect();
+    let mut order: Vec<u32> = (0..count).filter(|&t| may_go(t)).collect();
+    order.sort_by(|&a, &b| centre(&mesh, b).z.total_cmp(&centre(&mesh, a).z));
+    let mut gone = vec![false; count as usize];
+    let (velocities, mut touched) = (vec![Vec3::ZERO; mesh.positions.len()], 0);
+    for (turn, batch) in order.chunks(9).enumerate() {
+        for &tet in batch {
+            gone[tet as usize] = true;
+            all.iter_mut().for_each(|(_, collision)| collision.remove(tet));
+        }
+        let wave = |p: &Vec3| *p + Vec3::X * 0.5 * (0.4 * p.z + 0.2 * turn as f32).sin();
+        let positions: Vec<Vec3> = mesh.positions.iter().map(wave).collect();
+        let z = EDGE_MM + 2.0 - 10.0 * turn as f32 / (order.len() / 9) as f32;
+        let tool = ToolState::at(Pose::from_translation(Vec3::new(12.0 + (turn as f32).sin(), 12.5, z)));
+        let left = TetMesh {
+            tets: (0..count).filter(|&t| !gone[t as usize]).map(|t| mesh.tets[t as usize]).collect(),
+            positions: mesh.positions.clone(),
+        };
+        let mut anew = TissueStep::default();
+        collision(&left, "brute", |_| false).step(&positions, &velocities, &tool, &mut anew);
+        for (name, collision) in &mut all {
+            let mut step = TissueStep::default();
+            collision.step(&positions, &velocities, &tool, &mut step);
+            assert!(step.points_in_contact == anew.points_in_contact, "{name} in turn {turn}");
+            assert!(alike(felt(&step), felt(&anew)), "{name} in turn {turn}: {:?} {:?}", felt(&step), felt(&anew));
+            assert_eq!((step.skipped, step.stale, step.overflow), (0, 0, 0), "{name} in turn {turn}");
+        }
+        touched += u32::from(anew.manifold.depth_mm > 0.1);
+    }
+    assert!(touched > 10, "{touched}");
+}
+
+#[test]
+fn all_of_a_body_can_go_and_what_may_not_stays() {
+    let mesh = cube(3);
+    let mut collision = collision(&mesh, "walk", |_| true);
+    let (velocities, mut step) = (vec![Vec3::ZERO; mesh.positions.len()], TissueStep::default());
+    let inside = ToolState::at(Pose::from_translation(Vec3::splat(0.5 * EDGE_MM)));
+    let mut press = |collision: &mut TissueCollision| {
+        collision.step(&mesh.positions, &velocities, &inside, &mut step);
+        step.points_in_contact
+    };
+    assert!(press(&mut collision) > 0);
+    (0..mesh.tets.len() as u32).for_each(|t| collision.remove(t));
+    assert_eq!(press(&mut collision), 0);
+    collision.remove(u32::MAX);
+    let mut kept = self::collision(&mesh, "walk", |_| false);
+    (0..mesh.tets.len() as u32).for_each(|t| kept.remove(t));
+    assert!(press(&mut kept) > 0);
+}
