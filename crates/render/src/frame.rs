@@ -58,6 +58,9 @@ pub struct Frame<'a> {
     pub drilling: bool,
     /// Current nodes of the brain, world mm, in the order of the mesh; `None` shows it at rest.
     pub brain_positions: Option<&'a [Vec3]>,
+    /// Whether each tetrahedron of the brain was resected; `None` for none of them. The walls of
+    /// the hole are drawn with the MRI on them.
+    pub brain_gone: Option<&'a [bool]>,
     /// Whether the skull is shown in the 3-D view.
     pub show_bone: bool,
     /// Whether the brain is shown in the 3-D view.
@@ -128,6 +131,7 @@ impl Frame<'_> {
             turn_rad: 0.0,
             drilling: false,
             brain_positions: None,
+            brain_gone: None,
             show_bone: true,
             show_brain: true,
             bone_paint: None,

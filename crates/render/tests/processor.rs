@@ -14,7 +14,7 @@ use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Faults, GpuError};
 use trepan_mesh::TetMesh;
 use trepan_render::{
-    Camera, Casting, Frame, Image, Overlay, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo,
+    Camera, Casting, Cut, Frame, Image, Overlay, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo,
     StereoLook,
 };
 use trepan_volume::{AIR_HU, VoxelVolume};
@@ -151,6 +151,37 @@ fn threads_and_incremental_updates_do_not_change_the_picture() {
     anew.threads = 5;
     anew.draw(&frame).expect("drawn");
     assert_eq!(one.image(), anew.image());
+}
+
+/// Pictures of a brain without some tetrahedra, by renderers of all of it and of what is left.
+#[test]
+fn a_resected_brain_is_drawn_as_what_is_left_of_it() {
+    let (shell, mesh, mri, frame) = head();
+    let scene = |mesh| SceneData { bone: Some(shell.clone()), brain: Some(mesh), mri: Some(&mri), tint: None };
+    let moved: Vec<Vec3> = mesh.positions.iter().map(|&p| 0.9 * p + Vec3::new(2.0, 3.0, -1.0)).collect();
+    let cut = Some(Cut { point: Vec3::ZERO, normal: Vec3::X, bone: false });
+    let frame = Frame { brain_positions: Some(&moved), show_bone: false, cut, ..frame };
+    let gpu = device();
+    let pictures = |data: &SceneData, gone: &[Option<&[bool]>]| -> Vec<[Image; 2]> {
+        let mut processor = ProcessorRenderer::new(data, [160, 120]).expect("the scene loads");
+        let mut device = gpu.as_ref().map(|gpu| scene::renderer(gpu, data, [160, 120]));
+        let draw = |brain_gone: &Option<&[bool]>| {
+            let frame = Frame { brain_gone: *brain_gone, ..frame };
+            processor.draw(&frame).expect("drawn");
+            let on_device = device.as_mut().map(|device| {
+                device.draw(&frame).expect("drawn");
+                device.image().expect("the picture is read")
+            });
+            [processor.image().clone(), on_device.unwrap_or_else(|| processor.image().clone())]
+        };
+        gone.iter().map(draw).collect()
+    };
+    let gone = [true, false, false, false, true];
+    let shown = pictures(&scene(&mesh), &[None, Some(&gone), Some(&[true; 5]), Some(&[false; 5])]);
+    let left = TetMesh { positions: mesh.positions.clone(), tets: mesh.tets[1..4].to_vec() };
+    assert_eq!(shown[1], pictures(&scene(&left), &[None])[0]);
+    assert_eq!(shown[0], shown[3], "all of it is back");
+    assert!(shown[0] != shown[1] && shown[1] != shown[2]);
 }
 
 #[test]

@@ -27,16 +27,26 @@ struct Device {
     corners: Buffer<[u32; 3]>,
 }
 
+impl Device {
+    /// Buffers for a boundary at rest; one node and one triangle where there is none.
+    fn of(gpu: &Gpu, border: &Border) -> Result<Self, RenderError> {
+        let (nodes, triangles) = (border.places.len().max(1), border.triangles.len().max(1));
+        let device = Self {
+            places: Buffer::zeroed(gpu, "brain places", nodes)?,
+            normals: Buffer::zeroed(gpu, "brain normals", nodes)?,
+            rest: Buffer::zeroed(gpu, "brain at rest", nodes)?,
+            corners: Buffer::zeroed(gpu, "brain corners", triangles)?,
+        };
+        device.rest.write(gpu, 0, &wide(&border.places));
+        device.corners.write(gpu, 0, &border.triangles);
+        Ok(device)
+    }
+}
+
 impl Brain {
     pub fn new(gpu: &Gpu, mesh: &TetMesh) -> Result<Self, RenderError> {
         let border = Border::of(mesh);
-        let nodes = border.places.len();
-        let device = Device {
-            places: Buffer::zeroed(gpu, "brain places", nodes)?,
-            normals: Buffer::zeroed(gpu, "brain normals", nodes)?,
-            rest: Buffer::from_slice(gpu, "brain at rest", &wide(&border.places))?,
-            corners: Buffer::from_slice(gpu, "brain corners", &border.triangles)?,
-        };
+        let device = Device::of(gpu, &border)?;
         let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
         let pipeline = Pipeline::new(
             gpu,
@@ -53,12 +63,22 @@ impl Brain {
         Ok(Self { border, device, pipeline })
     }
 
-    /// Updates the boundary from the mesh's nodes, or resets it to rest.
-    pub fn follow(&mut self, gpu: &Gpu, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
+    /// Updates the boundary from the mesh's nodes, or resets it to rest. Returns whether other
+    /// tetrahedra are gone than before: then the pass is to be bound again.
+    pub fn follow(
+        &mut self,
+        gpu: &Gpu,
+        positions: Option<&[Vec3]>,
+        gone: Option<&[bool]>,
+    ) -> Result<bool, RenderError> {
+        let is_other = self.border.leave_out(gone);
+        if is_other {
+            self.device = Device::of(gpu, &self.border)?;
+        }
         self.border.follow(positions)?;
         self.device.places.write(gpu, 0, &wide(&self.border.places));
         self.device.normals.write(gpu, 0, &wide(&self.border.normals));
-        Ok(())
+        Ok(is_other)
     }
 
     /// Binds the pass to the frame's uniform.

@@ -62,10 +62,7 @@ impl EyeTextures {
             Ok((texture, bindings))
         };
         let apart = (!whole).then(|| separate(sheet("apart", Format::Rgba8Unorm, true)?)).transpose()?;
-        let brain = passes
-            .brain
-            .as_ref()
-            .map(|(brain, face)| -> Result<_, RenderError> { Ok([brain.bind(gpu, scene)?, face.bind(gpu, scene)?]) });
+        let brain = bind_brain(gpu, passes, scene)?;
         let part = Buffer::zeroed(gpu, "part", 1)?;
         let lit = apart.as_ref().map_or(picture, |(texture, _)| texture);
         let light = passes.light.bind(gpu, scene, &sheets([&skull_hit, &brain_hit, &brain_rest, lit], passes))?;
@@ -80,17 +77,18 @@ impl EyeTextures {
             light,
             part,
             overlay: passes.overlay.bind(gpu, scene, &skull_hit, &brain_hit)?,
-            brain: brain.transpose()?,
+            brain,
             skull_hit,
             brain_hit,
             brain_rest,
         })
     }
 
-    /// Rebinds bone and lighting, after a paint's texture or the bone's buffers changed.
+    /// Rebinds bone, brain and lighting, after a paint's texture or their buffers changed.
     pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes, picture: &Texture) -> Result<(), RenderError> {
         let scene = &passes.scenes[self.number];
         self.skull = passes.skull.bind(gpu, scene, &self.part, &self.skull_hit)?;
+        self.brain = bind_brain(gpu, passes, scene)?;
         let sheets = sheets([&self.skull_hit, &self.brain_hit, &self.brain_rest, self.lit(picture)], passes);
         self.light = passes.light.bind(gpu, scene, &sheets)?;
         Ok(())
@@ -143,6 +141,12 @@ impl EyeTextures {
         passes.skull.cast(recorder, &self.skull, [width, height]);
         width * height
     }
+}
+
+/// Bindings of the brain's boundary and of its cut.
+fn bind_brain(gpu: &Gpu, passes: &Passes, scene: &Buffer<Scene>) -> Result<Option<[Bindings; 2]>, RenderError> {
+    let Some((brain, face)) = &passes.brain else { return Ok(None) };
+    Ok(Some([brain.bind(gpu, scene)?, face.bind(gpu, scene)?]))
 }
 
 fn sheets<'a>([skull_hit, brain_hit, brain_rest, picture]: [&'a Texture; 4], passes: &'a Passes) -> Sheets<'a> {

@@ -113,8 +113,12 @@ impl Renderer {
     /// Updates the brain and its cut; returns the number of triangles over the limit.
     fn follow_brain(&mut self, frame: &Frame) -> Result<u32, RenderError> {
         let Some((brain, face)) = &mut self.passes.brain else { return Ok(0) };
-        brain.follow(&self.gpu, frame.brain_positions)?;
-        Ok(face.follow(&self.gpu, Cut::plane(frame.cut.as_ref()), &brain.border))
+        let is_other = brain.follow(&self.gpu, frame.brain_positions, frame.brain_gone)?;
+        let left = face.follow(&self.gpu, Cut::plane(frame.cut.as_ref()), &brain.border);
+        if is_other {
+            self.canvas.rebind(&self.gpu, &self.passes)?;
+        }
+        Ok(left)
     }
 
     /// Uploads paints and overlay; returns the number of shapes over the limit.

@@ -164,6 +164,7 @@ impl ProcessorRenderer {
         [frame.bone_paint, frame.brain_paint].into_iter().flatten().try_for_each(Paint::check)?;
         let followed = self.bricks.follow(self.bricks_per_frame);
         if let Some(brain) = &mut self.brain {
+            brain.leave_out(frame.brain_gone);
             brain.follow(frame.brain_positions)?;
         }
         let (items, lines_left) = items(&frame.overlay, self.view(frame).eye);
