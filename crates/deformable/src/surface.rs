@@ -88,7 +88,8 @@ impl MovingSurface {
     }
 
     /// The border of a mesh of which some tetrahedra may be removed: the faces behind which they
-    /// lie are listed from the start.
+    /// lie are listed from the start, behind the border. Until one is removed every step has the
+    /// same bits as without.
     pub(crate) fn resectable(mesh: &TetMesh, neighbours: &[[u32; 4]], may_go: impl Fn(u32) -> bool) -> Self {
         let mut faces = Surface::default();
         let (mut live, mut order) = (Vec::new(), Vec::new());
@@ -105,7 +106,7 @@ impl MovingSurface {
         surface.fresh.reserve(surface.boxes.len());
         surface.may_go = (0..mesh.tets.len() as u32).map(may_go).collect();
         surface.triangle_of_face = vec![[NONE; 4]; mesh.tets.len()];
-        for (triangle, &number) in along_morton_curve(mesh, &faces).iter().enumerate() {
+        for (triangle, &number) in along_morton_curve(mesh, &faces, &live).iter().enumerate() {
             let [tet, face] = order[number as usize];
             surface.triangle_of_face[tet as usize][face as usize] = triangle as u32;
         }
@@ -144,7 +145,7 @@ impl MovingSurface {
 
     /// Clusters of triangles; all of them are border unless `live` says which.
     fn over(mesh: &TetMesh, surface: &Surface, live: &[bool]) -> Self {
-        let order = along_morton_curve(mesh, surface);
+        let order = along_morton_curve(mesh, surface, live);
         let triangles: Vec<_> = order.iter().map(|&t| surface.triangles[t as usize]).collect();
         let tet_of_triangle = order.iter().map(|&t| surface.tet_of_triangle[t as usize]).collect();
         let area = |corners: [Vec3; 3]| 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
@@ -408,14 +409,16 @@ impl MovingSurface {
 /// Most triangles crossed in one descent.
 const MAX_DESCENT: usize = 64;
 
-/// Triangle numbers sorted by the Morton code of their centre at rest.
-fn along_morton_curve(mesh: &TetMesh, surface: &Surface) -> Vec<u32> {
+/// Triangle numbers sorted by the Morton code of their centre at rest; those that are no border yet
+/// come last, so that the border has the numbers that it has without them.
+fn along_morton_curve(mesh: &TetMesh, surface: &Surface, live: &[bool]) -> Vec<u32> {
     let bounds = mesh.bounds();
     let scale = 1023.0 / bounds.size().max_element().max(f32::MIN_POSITIVE);
     let code = |t: &u32| {
         let [a, b, c] = surface.triangles[*t as usize].map(|n| mesh.positions[n as usize]);
         let cell = (((a + b + c) / 3.0 - bounds.min) * scale).as_uvec3();
-        spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2
+        let is_hidden = live.get(*t as usize).is_some_and(|live| !live);
+        (is_hidden, spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2)
     };
     let mut order: Vec<u32> = (0..surface.triangles.len() as u32).collect();
     order.sort_by_cached_key(code);

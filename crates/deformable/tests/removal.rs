@@ -74,6 +74,26 @@ fn a_hole_is_felt_as_in_the_mesh_without_it_by_every_search() {
 }
 
 #[test]
+fn until_something_is_removed_every_bit_is_as_without() {
+    let mesh = cube(9);
+    let config = Config { friction: 0.2, shaft: true, ..Config::default() };
+    let plain = || TissueCollision::new(&mesh, &Tool::probe(3.0), &config).expect("a sound mesh");
+    let mut both = [plain(), plain().resectable(&mesh, |t| t % 3 > 0).expect("a search of this crate")];
+    let (velocities, mut random) = (vec![Vec3::X * 0.01; mesh.positions.len()], common::Random::new(7));
+    for turn in 0..60 {
+        let positions = common::deformed(&mesh, 0.5, 0.1 * turn as f32, &mut random);
+        let tip = Vec3::new(12.0 + 0.1 * turn as f32, 12.0, EDGE_MM + 1.0 - 0.05 * turn as f32);
+        let tool = ToolState::at(Pose::from_translation(tip));
+        let felt = both.each_mut().map(|collision| {
+            let mut step = TissueStep::default();
+            collision.step(&positions, &velocities, &tool, &mut step);
+            (felt(&step).map(f32::to_bits), step.surface_springs.len(), step.points_in_contact)
+        });
+        assert_eq!(felt[0], felt[1], "turn {turn}");
+    }
+}
+
+#[test]
 fn all_of_a_body_can_go_and_what_may_not_stays() {
     let mesh = cube(3);
     let mut collision = collision(&mesh, "walk", |_| true);
