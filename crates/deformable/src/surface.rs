@@ -87,8 +87,8 @@ impl MovingSurface {
         Self::over(mesh, &Surface::of(mesh), &[])
     }
 
-    /// The border of a mesh of which some tetrahedra may be removed: the faces behind which they
-    /// lie are listed from the start, behind the border. Until one is removed every step has the
+    /// The border of a mesh of which some tetrahedra may be removed. Faces in front of those are
+    /// listed from the start, after the border. Until one is removed every step has the
     /// same bits as without.
     pub(crate) fn resectable(mesh: &TetMesh, neighbours: &[[u32; 4]], may_go: impl Fn(u32) -> bool) -> Self {
         let mut faces = Surface::default();
@@ -409,8 +409,8 @@ impl MovingSurface {
 /// Most triangles crossed in one descent.
 const MAX_DESCENT: usize = 64;
 
-/// Triangle numbers sorted by the Morton code of their centre at rest; those that are no border yet
-/// come last, so that the border has the numbers that it has without them.
+/// Triangle numbers sorted by the Morton code of their centre at rest, the border first. So the
+/// border has the numbers that it has without those that are no border yet.
 fn along_morton_curve(mesh: &TetMesh, surface: &Surface, live: &[bool]) -> Vec<u32> {
     let bounds = mesh.bounds();
     let scale = 1023.0 / bounds.size().max_element().max(f32::MIN_POSITIVE);
