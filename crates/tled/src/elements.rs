@@ -88,7 +88,7 @@ impl Elements {
             fills.triangles_on(tet).for_each(|(triangle, index)| team.fill(index, body, triangle, filling));
         }
         for node in falling.iter().flat_map(|&tet| body.mesh.tets[tet as usize]) {
-            team.nodes().set_weight(layout.place_of[node as usize] as usize, fills.grams(body, node));
+            team.nodes().set_weight(layout.place_of[node as usize] as usize, fills.grams(node));
             if self.averaged_pressure {
                 let volumes = fills.volumes(body, layout, node);
                 volumes.for_each(|(group, mm3)| team.force_slots().set_volume(group, mm3));

@@ -41,6 +41,8 @@ pub(crate) struct Fills {
     /// Tetrahedron below each triangle of the membrane, ascending; the triangle, and where it is.
     sheets: Vec<(u32, u32, PartIndex)>,
     tets_of_node: Csr,
+    /// A quarter of each tetrahedron's rest volume, mm³, and of its mass, g.
+    quarters: Vec<[f64; 2]>,
     pub node_groups: NodeGroups,
 }
 
@@ -84,8 +86,22 @@ impl Fills {
         };
         let mut sheets: Vec<_> = sheets.iter().enumerate().flat_map(of_sheet).collect();
         sheets.sort_unstable();
+        let quarter = |t: usize| {
+            let mm3 = 0.25 * body.mesh.volume_mm3(t);
+            [mm3, mm3 * f64::from(body.material(t).density_g_mm3())]
+        };
+        let quarters = (0..tets.len()).map(quarter).collect();
         let (now, goal) = (vec![FULL; tets.len()], vec![FULL; tets.len()]);
-        Self { now, goal, falling: Vec::with_capacity(tets.len()), indices, sheets, tets_of_node, node_groups }
+        Self {
+            now,
+            goal,
+            falling: Vec::with_capacity(tets.len()),
+            indices,
+            sheets,
+            tets_of_node,
+            quarters,
+            node_groups,
+        }
     }
 
     /// Lowers the goal of a tetrahedron; a higher one changes nothing.
@@ -120,12 +136,9 @@ impl Fills {
     }
 
     /// Mass with weight of a mesh node, g; `None` where nothing is left around it.
-    pub fn grams(&self, body: &Body, node: u32) -> Option<f64> {
+    pub fn grams(&self, node: u32) -> Option<f64> {
         let around = self.tets_of_node.row(node as usize);
-        let quarter = |&t: &u32| {
-            let density = f64::from(body.material(t as usize).density_g_mm3());
-            density * body.mesh.volume_mm3(t as usize) / 4.0 * share(self.now[t as usize])
-        };
+        let quarter = |&t: &u32| self.quarters[t as usize][1] * share(self.now[t as usize]);
         around.iter().any(|&t| self.now[t as usize] > 0).then(|| around.iter().map(quarter).sum())
     }
 
@@ -137,7 +150,7 @@ impl Fills {
         node: u32,
     ) -> impl Iterator<Item = (usize, f64)> + use<'a> {
         let around = self.tets_of_node.row(node as usize);
-        let quarter = |t: u32| 0.25 * body.mesh.volume_mm3(t as usize) * share(self.now[t as usize]);
+        let quarter = |t: u32| self.quarters[t as usize][0] * share(self.now[t as usize]);
         self.node_groups.all_at(layout.place_of[node as usize]).map(move |group| {
             let own = around.iter().filter(move |&&t| self.node_groups.has(group, body, t));
             (group, own.map(move |&t| quarter(t)).sum())

@@ -182,7 +182,7 @@ impl Tled {
     /// [`FULL`](crate::FULL), over the next [`RAMP_STEPS`](crate::RAMP_STEPS) steps at most.
     ///
     /// A fill never rises: a higher one, or that of a tetrahedron that the mesh lacks, changes
-    /// nothing. Costs 1 us in each of these steps, and no memory.
+    /// nothing. Costs 3 us in each of these steps, and no memory.
     pub fn lower_fill(&mut self, tet: u32, fill: u16) {
         self.elements.fills.lower(tet, fill);
     }
