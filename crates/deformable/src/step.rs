@@ -86,6 +86,16 @@ impl TissueCollision {
         Ok(self)
     }
 
+    /// Tetrahedron of each of the tool's points that was inside the tissue in the last step.
+    pub fn tets_touched(&self) -> impl Iterator<Item = u32> {
+        self.hits.tet[..self.hits.tet.len() - 1].iter().copied().filter(|&tet| tet != NONE)
+    }
+
+    /// Number of the tool's points.
+    pub fn points(&self) -> usize {
+        self.shell.points.len()
+    }
+
     /// Takes a tetrahedron away: from the next step on its faces are border. Nothing happens to one
     /// that [`resectable`](Self::resectable) did not name.
     pub fn remove(&mut self, tet: u32) {

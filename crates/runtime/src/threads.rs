@@ -92,6 +92,7 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
             *seq = record.seq;
             (loads.gravity, loads.fluid) = (stage.loads().gravity, stage.loads().fluid);
             loads.contacts.copy_from(&stage.loads().contacts);
+            loads.fills.clone_from(&stage.loads().fills);
         });
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;

@@ -40,6 +40,10 @@ pub trait SoftSolver: Send {
         self.stable_dt_ms()
     }
 
+    /// Lets the fill of each tetrahedron fall to a share of its rest volume, in 65,535ths; a higher
+    /// one than before changes nothing. A solver that takes nothing away does nothing.
+    fn lower_fills(&mut self, _fills: &[u16]) {}
+
     /// Maker of a solver of the same body for a processor that is too slow: it costs less and errs
     /// more in motion. `None` where there is none.
     fn cheaper(&self) -> Option<MakeSolver> {
@@ -89,6 +93,10 @@ pub struct Loads {
     pub contacts: NodalContacts,
     /// Fluid around the body, with its level; TLED takes it, others do not.
     pub fluid: Fluid,
+    /// Fill of each tetrahedron that resection leaves, in 65,535ths of its rest volume; empty where
+    /// nothing is resected. Whoever moves the loads gives them to
+    /// [`lower_fills`](SoftSolver::lower_fills).
+    pub fills: Vec<u16>,
 }
 
 /// What happened in one step; every count is of this step alone.

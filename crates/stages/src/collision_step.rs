@@ -8,6 +8,7 @@
 //! surface pressure it does so from the start. The stage has no clock; the same tools and positions
 //! give the same results.
 
+use crate::aspirator::Aspirator;
 use crate::haptic_tick::ToolSample;
 use crate::program::{Phase, Program};
 use crate::settling::Settling;
@@ -27,6 +28,7 @@ impl CollisionStage {
         if !self.with_torque {
             self.patch.couple_mm = Vec3::ZERO;
         }
+        self.aspirate(sample);
         self.settling.load(sample.phase(), sample.state.time_ms, &mut self.loads);
         self.press(sample.phase(), soft);
         self.seq += 1;
@@ -37,6 +39,15 @@ impl CollisionStage {
             depth_mm: self.step.manifold.depth_mm,
             points: self.step.points_in_contact,
             compute_us: 0.0,
+        }
+    }
+
+    /// Takes tissue away that an aspirator touches; contact feels that from the next step on.
+    fn aspirate(&mut self, sample: &ToolSample) {
+        let Some(aspirator) = &mut self.aspirator else { return };
+        aspirator.step(sample, &self.tools[sample.slot], &mut self.loads.fills);
+        for tool in &mut self.tools {
+            aspirator.gone.iter().for_each(|&tet| tool.remove(tet));
         }
     }
 
@@ -99,6 +110,7 @@ pub struct CollisionStage {
     /// Whether the brain is pressed, and so needs the wall, before the dura is open.
     under_pressure: bool,
     settling: Settling,
+    aspirator: Option<Aspirator>,
     patch: SurfacePatch,
     loads: Loads,
     step: TissueStep,
@@ -114,18 +126,28 @@ impl CollisionStage {
         config: &Config,
         wall: Option<SkullWall>,
     ) -> Result<Self, ConfigError> {
+        Self::with_tools(program.tray(), mesh, config, wall)
+    }
+
+    fn with_tools(
+        tools: &[Tool],
+        mesh: &TetMesh,
+        config: &Config,
+        wall: Option<SkullWall>,
+    ) -> Result<Self, ConfigError> {
         let of_tool = |tool: &Tool| {
             let config = Config { shaft: Phase::of(tool) == Phase::Brain, ..config.clone() };
             TissueCollision::new(mesh, tool, &config)
         };
         Ok(Self {
-            tools: program.tray().iter().map(of_tool).collect::<Result<_, _>>()?,
+            tools: tools.iter().map(of_tool).collect::<Result<_, _>>()?,
             wall,
             folds: None,
             with_torque: false,
             under_pressure: false,
             patch: SurfacePatch::default(),
             settling: Settling::default(),
+            aspirator: None,
             loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
             step: TissueStep::default(),
             seq: 0,
@@ -155,6 +177,23 @@ impl CollisionStage {
         Self { settling, ..self }
     }
 
+    /// Lets an aspirator take tissue away while its pedal is down, by the rate of each tetrahedron,
+    /// mm/ms; those of rate 0 stay.
+    ///
+    /// # Errors
+    /// For a search of other crates, which may keep a border of its own.
+    pub fn aspirating(self, mesh: &TetMesh, rates: &[f32]) -> Result<Self, ConfigError> {
+        let may_go = |tet: u32| rates.get(tet as usize).is_some_and(|rate| *rate > 0.0);
+        let tools = self.tools.into_iter().map(|tool| tool.resectable(mesh, may_go)).collect::<Result<_, _>>()?;
+        let loads = Loads { fills: vec![u16::MAX; mesh.tets.len()], ..self.loads };
+        Ok(Self { tools, loads, aspirator: Some(Aspirator::of(mesh, rates)), ..self })
+    }
+
+    /// Volume that was aspirated so far, mm³.
+    pub fn aspirated_mm3(&self) -> f64 {
+        self.aspirator.as_ref().map_or(0.0, |aspirator| aspirator.taken_mm3)
+    }
+
     /// Returns the surface patch for the haptic thread.
     pub fn patch(&self) -> &SurfacePatch {
         &self.patch
@@ -170,8 +209,69 @@ impl CollisionStage {
 mod tests {
     use super::*;
     use crate::haptic_tick::ToolSample;
-    use trepan_geometry::{Pose, ToolState};
-    use trepan_soft::boxes;
+    use crate::solver_step::SolverStage;
+    use std::f64::consts::PI;
+    use trepan_geometry::{Buttons, Pose, ToolState};
+    use trepan_soft::{Body, Material, boxes};
+    use trepan_tled::{Config as Solver, Tled};
+
+    /// An aspirator goes 6 mm into a block of brain in 0.6 s and rests there. Returns the volume
+    /// that it took, what the law says, its largest force and the solver's nodes.
+    fn aspirated(rates: impl Fn(Vec3) -> f32, pedal: Buttons) -> (f64, f64, f32, Vec<Vec3>) {
+        let mesh = boxes::split_box([12, 12, 9], Vec3::new(24.0, 24.0, 18.0));
+        let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+        let rates: Vec<f32> =
+            (0..mesh.tets.len()).map(|t| rates(mesh.corners(t).into_iter().sum::<Vec3>() / 4.0)).collect();
+        let tool = Tool::aspirator();
+        let stage = CollisionStage::with_tools(&[tool], &mesh, &Config::default(), None).unwrap();
+        let mut stage = stage.aspirating(&mesh, &rates).unwrap();
+        let config = Solver { averaged_pressure: true, ..Solver::default() };
+        let mut solver =
+            SolverStage::new(Box::new(Tled::new(&Body::uniform(mesh, fixed, Material::BRAIN), &config).unwrap()));
+        let (mut frame, mut by_law, mut most_n) = (SoftFrame::default(), 0.0, 0.0f32);
+        for tick in 1..=900u64 {
+            let z = 18.0 + tool.tip_radius_mm - 0.01 * tick.min(600) as f32;
+            let mut state = ToolState::at(Pose::from_translation(Vec3::new(12.3, 12.2, z)));
+            (state.time_ms, state.buttons) = (tick as f64, pedal);
+            solver.publish(&mut frame);
+            let record = stage.step(&ToolSample { tick, state, tool, slot: 0, drilling: false }, &frame);
+            let point_mm2 = 4.0 * PI * f64::from(tool.tip_radius_mm).powi(2) / stage.tools[0].points() as f64;
+            by_law += if tick > 1 { f64::from(record.points) * point_mm2 * f64::from(RATE) } else { 0.0 };
+            most_n = most_n.max(stage.patch().force_n);
+            while solver.time_ms() < tick as f64 {
+                solver.step(stage.loads(), record.seq);
+            }
+        }
+        let faults = solver.solver_faults();
+        assert_eq!((faults.limited, faults.non_finite, faults.skipped_ms), (0, 0, 0.0), "{faults:?}");
+        let fills = &stage.loads().fills;
+        let left: f64 =
+            fills.iter().map(|f| f64::from(*f) / 65_535.0).sum::<f64>() * 24.0 * 24.0 * 18.0 / fills.len() as f64;
+        assert!((stage.aspirated_mm3() + left - 24.0 * 24.0 * 18.0).abs() < 0.1, "volume is accounted for");
+        (stage.aspirated_mm3(), by_law, most_n, solver.positions().to_vec())
+    }
+
+    /// Rate of the tests, mm/ms.
+    const RATE: f32 = 0.05;
+
+    #[test]
+    fn an_aspirator_takes_what_the_law_says_and_sinks_in_with_less_force() {
+        let (taken, by_law, force_n, nodes) = aspirated(|_| RATE, Buttons::PEDAL);
+        let (none, _, pressed_n, _) = aspirated(|_| RATE, Buttons(0));
+        // The hole is at least the tip's way, and elements with a tenth left go as a whole.
+        assert!(taken > 20.0 && (taken / by_law - 1.0).abs() < 0.15, "{taken} {by_law} mm³");
+        assert!(none == 0.0 && force_n < 0.7 * pressed_n, "{force_n} {pressed_n} N");
+        assert!(aspirated(|_| RATE, Buttons::PEDAL).3 == nodes, "the same bits again");
+    }
+
+    #[test]
+    fn what_has_no_rate_stays() {
+        let (taken, _, force_n, _) = aspirated(|_| 0.0, Buttons::PEDAL);
+        let (_, _, pressed_n, _) = aspirated(|_| 0.0, Buttons(0));
+        assert!(taken == 0.0 && force_n == pressed_n);
+        let (half, _, _, _) = aspirated(|p| if p.z > 16.0 { RATE } else { f32::NAN }, Buttons::PEDAL);
+        assert!(half > 5.0 && half < 24.0 * 24.0 * 2.0);
+    }
 
     /// A clamp of brain: two arms, 4 mm apart, on a back; the tool is far away.
     #[test]

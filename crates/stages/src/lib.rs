@@ -23,6 +23,7 @@
 
 pub mod ahead;
 pub mod alarms;
+mod aspirator;
 pub mod collision_step;
 mod drill;
 mod fault;

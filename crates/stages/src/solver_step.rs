@@ -35,6 +35,10 @@ impl SolverStage {
         if switched {
             (self.loads.gravity, self.loads.fluid) = (loads.gravity, loads.fluid);
             self.loads.contacts.copy_from(&loads.contacts);
+            if self.loads.fills != loads.fills {
+                self.loads.fills.clone_from(&loads.fills);
+                self.solver.lower_fills(&loads.fills);
+            }
             (self.contact_seq, self.followed_ms) = (contact_seq, 0.0);
             self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
         }
@@ -105,6 +109,7 @@ impl SolverStage {
             return false;
         };
         solver.resume(self.solver.state(), &self.solver.memory());
+        solver.lower_fills(&self.loads.fills);
         self.solver = solver;
         self.solver_faults.cheaper_from_ms = Some(self.time_ms);
         true

@@ -55,6 +55,10 @@ impl SoftSolver for Tled {
         self.base.next_dt_ms(self.growth)
     }
 
+    fn lower_fills(&mut self, fills: &[u16]) {
+        (0u32..).zip(fills).for_each(|(tet, &fill)| self.elements.fills.lower(tet, fill));
+    }
+
     /// The same with a [`Config::mass_scaling`] of a tenth: longer steps.
     fn cheaper(&self) -> Option<MakeSolver> {
         let config = Config { mass_scaling: CHEAPER_MASS_SCALING, ..self.base.config };
