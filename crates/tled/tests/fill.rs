@@ -2,7 +2,7 @@
 
 use trepan_geometry::Vec3;
 use trepan_mesh::{Surface, TetMesh};
-use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, StepReport, boxes};
+use trepan_soft::{Body, Loads, Material, Membrane, SoftSolver, StepReport, SurfacePressure, boxes};
 use trepan_tled::{Config, FULL, Kernel, RAMP_STEPS, Relaxation, Settling, Tled};
 
 const GRAVITY: Vec3 = Vec3::new(2e-3, 0.0, -9.81e-3);
@@ -81,6 +81,42 @@ fn a_body_with_a_hole_settles_as_the_body_meshed_without_it() {
         let (a, b) = (weight(&holed, &body.fixed), weight(&anew, &left.fixed));
         assert!(a.distance(b) < 1e-4 * b.length(), "{a} {b}");
     }
+}
+
+/// Lamé: a ball of radius a in an unbounded body under the pressure p widens by `p a³ / (4 G r²)`
+/// at r. Here it is emptied in a free cube of eight times its radius; a is that of its volume.
+#[test]
+fn a_cavity_under_pressure_widens_as_lame_says() {
+    let off = [8, 14].map(|cells| {
+        let (middle, mesh) = (Vec3::splat(30.0), boxes::split_box([cells; 3], Vec3::splat(60.0)));
+        let corners = boxes::nodes_where(&mesh, |p| p.z < 1e-3 && [p.x, p.y].iter().all(|x| (x - 30.0).abs() > 29.0));
+        let body = Body::uniform(mesh, corners, Material::BRAIN);
+        let taken: Vec<u32> = (0..body.mesh.tets.len() as u32)
+            .filter(|t| centre(&body.mesh, *t as usize).distance(middle) < 8.0)
+            .collect();
+        let (left, nodes) = without(&body, &taken);
+        let wall = Surface::of(&left.mesh)
+            .triangles
+            .into_iter()
+            .filter(|triangle| triangle.iter().all(|n| left.mesh.positions[*n as usize].distance(middle) < 20.0));
+        let triangles = wall.map(|triangle| triangle.map(|n| nodes[n as usize])).collect();
+        let mpa = 0.08 * body.materials[0].shear_mpa() as f32;
+        let mut tled = emptied(&body, &Config { averaged_pressure: true, ..Config::default() }, &taken);
+        tled.set_pressure(SurfacePressure { triangles, mpa });
+        let settled = tled.settle(&Loads::default(), &Settling { tolerance_mm: 5e-4, ..Settling::default() });
+        assert!(settled.converged, "{settled:?}");
+        let volume: f64 = taken.iter().map(|&t| body.mesh.volume_mm3(t as usize)).sum();
+        let a3 = 3.0 * volume / (4.0 * std::f64::consts::PI);
+        let ratio = |n: &u32| {
+            let from = body.mesh.positions[*n as usize] - middle;
+            let widened = (tled.positions()[*n as usize] - body.mesh.positions[*n as usize]).dot(from.normalize());
+            let r2 = f64::from(from.length_squared());
+            (r2 > 12.0 * 12.0 && r2 < 18.0 * 18.0).then(|| f64::from(widened) * 4.0 * r2 / (0.08 * a3))
+        };
+        let ratios: Vec<f64> = nodes.iter().filter_map(ratio).collect();
+        ratios.iter().sum::<f64>() / ratios.len() as f64 - 1.0
+    });
+    assert!(off[0].abs() < 0.2 && off[1].abs() < 0.1, "{off:?}");
 }
 
 #[test]
