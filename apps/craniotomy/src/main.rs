@@ -7,6 +7,6 @@ fn main() -> ExitCode {
     let case = trepan_fixtures::case_head();
     let tissues = TissueSource::regions_of_aseg(case.aseg);
     let (ct, mri, labels) = (Some(case.ct), Some(case.mri), Some(case.labels));
-    let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues };
+    let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues, ..Inputs::default() };
     command(Program::Craniotomy, built_in)
 }

@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let head = trepan_fixtures::case_head();
             let tissues = TissueSource::regions_of_aseg(head.aseg);
             let [ct, mri, labels] = [head.ct, head.mri, head.labels].map(Some);
-            Inputs { name: Some(head.name), ct, mri, labels, tissues }
+            Inputs { name: Some(head.name), ct, mri, labels, tissues, ..Inputs::default() }
         }
     };
     let recipe = Recipe { spacing_mm: 1.0, tets: 8_000, halvings: 4, ..Recipe::default() };

@@ -9,6 +9,10 @@ const OPENING_MM: [f32; 2] = [7.0, 4.0];
 /// The same in a ground truth.
 const TRUTH_MM: [f32; 2] = [8.0, 5.0];
 
+/// Most halvings in a tumour, and how far around it, mm.
+const TUMOUR_HALVINGS: u32 = 3;
+const TUMOUR_MARGIN_MM: f32 = 2.0;
+
 /// Resolution of a mesh: tetrahedra of the whole brain, and the refinement around a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
@@ -37,6 +41,13 @@ impl Fineness {
     const fn at_opening(tets: usize, halvings: u32, [wide, deep]: [f32; 2]) -> Self {
         let radius_mm = (wide * wide + deep * deep) / (2.0 * deep);
         Self { tets, halvings, radius_mm, above_mm: radius_mm - deep }
+    }
+
+    /// The refined region around a tumour, mm: fine enough to resect it.
+    pub fn around(centre: Vec3, tumour_mm: f32, halvings: u32) -> Option<lattice::Fine> {
+        let halvings = halvings.min(TUMOUR_HALVINGS);
+        let fine = lattice::Fine { centre, radius_mm: tumour_mm + TUMOUR_MARGIN_MM, halvings };
+        Some(fine).filter(|_| halvings > 0)
     }
 
     /// The refined region at a place of the surface.

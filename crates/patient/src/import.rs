@@ -18,13 +18,13 @@ use crate::fineness::Fineness;
 use crate::fit::Fit;
 use crate::folder as case_folder;
 use crate::identity;
-use crate::opening::{Inside, Opening, REFERENCE_MM, bone_of};
+use crate::opening::{Inside, Opening, REFERENCE_MM, bone_of, middle, over};
 use crate::preview::Preview;
 use crate::progress::Progress;
 use crate::remark::WELL;
 use crate::space::Space;
 use crate::stages::ImportStages;
-use crate::tissue_class::TissueSource;
+use crate::tissue_class::{TissueSource, make_tumour};
 use crate::{Case, Inputs};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
@@ -95,7 +95,7 @@ impl<'a> Import<'a> {
         let images = self.images.take().map_or_else(|| read(self.inputs, self.requested, &mut self.stages), Ok)?;
         let images = self.images.insert(images);
         self.stages.next(stage)?;
-        let preview = images.preview(self.program, self.requested)?;
+        let preview = images.preview(self.program, self.inputs, self.requested)?;
         // Other tissues may change what counts as brain.
         let holds = self.inputs.tissues.is_empty() && self.program.has_bone();
         self.opening = preview.as_ref().map(|preview| preview.opening).filter(|_| holds);
@@ -156,7 +156,8 @@ fn key_of_images(program: Program, inputs: &Inputs, requested: &Recipe, cache: &
     let given = images.map(Option::is_some);
     let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes, &source.names)).collect();
     let of_images = Recipe { spacing_mm: 0.0, tets: 0, halvings: 0, ..*requested };
-    cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}"))
+    let tumour = inputs.tumour.map_or_else(String::new, |tumour| format!(" tumour {tumour:?}"));
+    cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}{tumour}"))
 }
 
 fn needs(program: Program, inputs: &Inputs, requested: &Recipe) -> Result<(), PatientError> {
@@ -175,6 +176,7 @@ fn needs(program: Program, inputs: &Inputs, requested: &Recipe) -> Result<(), Pa
     let idle = [
         ("--labels", inputs.labels.is_some() && inputs.mri.is_none(), "--mri PATH"),
         ("--tissue", !inputs.tissues.is_empty() && inputs.mri.is_none(), "--mri PATH"),
+        ("--tumour", inputs.tumour.is_some() && inputs.mri.is_none(), "--mri PATH"),
         ("--register", requested.register && (inputs.ct.is_none() || inputs.mri.is_none()), "both --ct and --mri"),
         ("--opening", requested.opening.is_some() && inputs.ct.is_none(), "--ct PATH"),
     ];
@@ -201,9 +203,11 @@ struct Images {
 
 impl Images {
     /// Opening on coarse voxels, skull and brain there; `None` if no opening is found.
-    fn preview(&self, program: Program, recipe: &Recipe) -> Result<Option<Preview>, PatientError> {
+    fn preview(&self, program: Program, inputs: &Inputs, recipe: &Recipe) -> Result<Option<Preview>, PatientError> {
         let mask = self.mask.as_ref().map(cropped).transpose()?;
         let inside = mask.as_ref().map(Inside::of);
+        let over = inputs.tumour.zip(inside.as_ref()).map(|(tumour, inside)| over(tumour, inside.middle));
+        let recipe = &Recipe { opening: recipe.opening.or(over), ..*recipe };
         let isovalue_hu = self.isovalue_hu;
         let of_bone = |ct: &VoxelVolume<i16>| {
             let (coarse, _) = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, isovalue_hu)?;
@@ -319,9 +323,14 @@ fn build(
     let make_classes =
         || mask.map(|mask| make_classes((inputs, tissues), &mask, ct_from_mri, &mut of_classes)).transpose();
     let (made, classes) = rayon::join(make_skull, make_classes);
-    let (made, classes) = (made?, classes?);
+    let (made, mut classes) = (made?, classes?);
     notes.extend(made.as_ref().and_then(|(_, islands)| loose(islands)));
     notes.append(&mut of_classes);
+    if let Some((classes, tumour)) = classes.as_mut().zip(inputs.tumour) {
+        notes.push(make_tumour(tumour, classes)?);
+    }
+    let over = inputs.tumour.zip(classes.as_ref()).map(|(tumour, classes)| over(tumour, middle(classes)));
+    let recipe = &Recipe { opening: recipe.opening.or(over), ..*recipe };
     stages.next("planning the opening")?;
     let on_skull = |(ct, (skull, _)): (_, (VoxelVolume<i16>, _))| {
         let world_from_voxel = skull.world_from_voxel;
@@ -344,7 +353,10 @@ fn build(
     stages.next("meshing the brain")?;
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
     let fineness = Fineness::stepped(recipe.tets, recipe.halvings);
-    let at = |opening: Opening| fineness.fine(opening.brain(), -Vec3::from(opening.inward));
+    let at = |opening: Opening| match inputs.tumour {
+        None => fineness.fine(opening.brain(), -Vec3::from(opening.inward)),
+        Some([x, y, z, radius_mm]) => Fineness::around(Vec3::new(x, y, z), radius_mm, recipe.halvings),
+    };
     let fine = opening.or_else(bare).and_then(at);
     let brain = mri.zip(classes).map(|(mri, classes)| make_brain(mri, classes, fine, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })

@@ -68,6 +68,8 @@ pub struct Inputs {
     pub labels: Option<PathBuf>,
     /// Label volumes of tissue classes inside the brain.
     pub tissues: Vec<TissueSource>,
+    /// A made tumour, if any: centre, RAS mm, and radius, mm.
+    pub tumour: Option<[f32; 4]>,
 }
 
 /// Patient data of a session.

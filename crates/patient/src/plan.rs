@@ -13,7 +13,7 @@
 use glam::Vec2;
 use trepan_bone::{BoneVolume, FlapSearch};
 use trepan_geometry::{Quat, Vec3};
-use trepan_haptics::script::{Rim, Site};
+use trepan_haptics::script::{Rim, Site, Target};
 
 /// Points of an outline.
 const RIMS: usize = 48;
@@ -45,6 +45,8 @@ pub struct Plan {
     pub flap_mm: f32,
     /// The flap's outline in its order, closed from the last to the first; empty without a flap.
     pub outline: Vec<Rim>,
+    /// The tumour, as a ball; `None` without one.
+    pub target: Option<Target>,
     /// The outline across the entry direction, from the site, mm.
     flat: Vec<Vec2>,
 }
@@ -56,8 +58,13 @@ impl Plan {
         let ring = |at: usize| Vec2::from_angle(at as f32 / RIMS as f32 * std::f32::consts::TAU) * flap_mm;
         match bone.filter(|_| flap_mm > 0.0) {
             Some(bone) => Self::around(bone, site, hole_mm, (0..RIMS).map(ring).collect()),
-            None => Some(Self { site, hole_mm, flap_mm: 0.0, outline: Vec::new(), flat: Vec::new() }),
+            None => Some(Self { site, hole_mm, flap_mm: 0.0, outline: Vec::new(), target: None, flat: Vec::new() }),
         }
+    }
+
+    /// Adds a tumour to resect.
+    pub fn with_target(self, target: Option<Target>) -> Self {
+        Self { target, ..self }
     }
 
     /// Plans a flap along a closed line drawn on the skull, with a hole of `hole_mm` radius where
@@ -77,7 +84,7 @@ impl Plan {
         let place = |at: &Vec2| site.entry + across(&site) * at.extend(0.0);
         let outline = flat.iter().map(|at| rim(bone, place(at), site.inward)).collect::<Option<Vec<_>>>()?;
         let flap_mm = flat.iter().map(|at| at.length()).fold(0.0, f32::max);
-        Some(Self { site, hole_mm, flap_mm, outline, flat })
+        Some(Self { site, hole_mm, flap_mm, outline, target: None, flat })
     }
 
     /// Distance of a place from the flap's outline across the entry direction, mm, negative inside;

@@ -5,7 +5,7 @@ use crate::mixture::{self, Shares};
 use crate::opening::{bare_brain, bone_of};
 use crate::tissue_class::TissueClass;
 use crate::{Brain, Case};
-use glam::{DAffine3, IVec3};
+use glam::{DAffine3, DVec3, IVec3};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
@@ -75,7 +75,10 @@ impl Scene {
         }
         let site = match (case.opening, &brain) {
             (Some(opening), _) if program.has_bone() => Some(opening.into()),
-            (_, Some(brain)) if !program.has_bone() => bare_brain(&brain.field, brain.mesh.bounds().centre()),
+            (_, Some(brain)) if !program.has_bone() => {
+                let tumour = brain.tumour().map(|(centre, _)| centre);
+                bare_brain(&brain.field, brain.mesh.bounds().centre(), tumour)
+            }
             _ => None,
         };
         let site = site.ok_or_else(|| {
@@ -99,9 +102,43 @@ impl RestBrain {
             fixed: fixed.to_vec(),
             anchors: anchors.to_vec(),
             membrane: Membrane { triangles, shear_n_per_mm: membrane },
-            materials: mixture::materials(of_classes, &self.mixtures, mixture::BOUND),
+            materials: self.materials(of_classes),
             material_of_tet: self.class_of_tet.iter().map(|code| code.saturating_sub(1)).collect(),
         }
+    }
+
+    /// Materials by class code minus one: the classes', in their order, then those of the mixtures.
+    pub fn materials(&self, of_classes: Vec<Material>) -> Vec<Material> {
+        mixture::materials(of_classes, &self.mixtures, mixture::BOUND)
+    }
+
+    /// Volume of each class, mm³, in the order of [`TissueClass::ALL`], of what is left of each
+    /// tetrahedron, of 65535.
+    pub fn left_mm3(&self, fills: &[u16]) -> [f64; TissueClass::ALL.len()] {
+        let mut left = [0.0; TissueClass::ALL.len()];
+        for (tet, (code, fill)) in self.class_of_tet.iter().zip(fills).enumerate() {
+            let mm3 = self.mesh.volume_mm3(tet) * f64::from(*fill) / f64::from(u16::MAX);
+            match usize::from(code.saturating_sub(1)).checked_sub(TissueClass::ALL.len()) {
+                None => left[usize::from(code.saturating_sub(1))] += mm3,
+                Some(at) => {
+                    left.iter_mut().zip(self.mixtures[at]).for_each(|(left, share)| *left += f64::from(share) * mm3)
+                }
+            }
+        }
+        left
+    }
+
+    /// Middle of the tumour's voxels and the radius of a ball of their volume, mm; `None` without a
+    /// tumour.
+    pub fn tumour(&self) -> Option<(Vec3, f32)> {
+        let codes = [TissueClass::Tumour, TissueClass::SoftTumour].map(TissueClass::code);
+        let [nx, ny, _] = self.classes.dims;
+        let place = |at: usize| self.classes.centre_of([at % nx, at / nx % ny, at / (nx * ny)]);
+        let all = (0..self.classes.data.len()).filter(|at| codes.contains(&self.classes.data[*at]));
+        let (count, sum) = all.fold((0.0, DVec3::ZERO), |(count, sum), at| (count + 1.0, sum + place(at)));
+        let mm3 = count * self.classes.spacing_mm().element_product();
+        let radius_mm = (0.75 * mm3 / std::f64::consts::PI).cbrt() as f32;
+        (count > 0.0).then(|| ((sum / count).as_vec3(), radius_mm))
     }
 
     /// Distance to the tissue of some classes, mm: exact up to 9 mm, at least 9 mm beyond. `None`

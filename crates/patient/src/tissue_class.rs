@@ -11,6 +11,7 @@ use glam::DAffine3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use trepan_geometry::Vec3;
 use trepan_soft::Material;
 use trepan_volume::{Grid, Interpolation, Segment, Segmentation, VoxelVolume, resample};
 
@@ -281,6 +282,29 @@ impl TissueSource {
     }
 }
 
+/// Makes the brain voxels in a ball a tumour; returns a remark with its volume.
+pub(crate) fn make_tumour(
+    [x, y, z, radius_mm]: [f32; 4],
+    classes: &mut VoxelVolume<u8>,
+) -> Result<String, PatientError> {
+    let centre = Vec3::new(x, y, z);
+    let [nx, ny, _] = classes.dims;
+    let voxel_ml = 1e-3 * classes.spacing_mm().element_product();
+    let is_in =
+        |at: &usize| classes.centre_of([at % nx, at / nx % ny, at / (nx * ny)]).as_vec3().distance(centre) <= radius_mm;
+    let ball: Vec<usize> = (0..classes.data.len()).filter(is_in).collect();
+    let brain: Vec<usize> = ball.iter().copied().filter(|at| classes.data[*at] != 0).collect();
+    let whole_ml = 1e-3 * f64::from(4.0 / 3.0 * std::f32::consts::PI * radius_mm.powi(3));
+    let ml = brain.len() as f64 * voxel_ml;
+    if ml < LEAST_INSIDE * whole_ml || brain.is_empty() {
+        return Err(PatientError::Usage(format!(
+            "--tumour {x},{y},{z},{radius_mm}: {ml:.1} of its {whole_ml:.1} ml lie in the brain: give a centre in the brain, RAS mm, and a radius of at least a voxel"
+        )));
+    }
+    brain.into_iter().for_each(|at| classes.data[at] = TissueClass::Tumour.code());
+    Ok(format!("tumour: made, {ml:.1} ml of brain around {x:.0},{y:.0},{z:.0} (RAS mm){WELL}"))
+}
+
 impl Serialize for TissueClass {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         to.serialize_str(self.name())
@@ -328,7 +352,6 @@ impl FromStr for TissueSource {
 mod tests {
     use super::*;
     use glam::DVec3;
-    use trepan_geometry::Vec3;
     use trepan_volume::nifti;
 
     #[test]
@@ -344,6 +367,24 @@ mod tests {
         for bad in ["tumur=x", "tumour", "brain=x", "tumour=", "tumour=:4"] {
             assert!(bad.parse::<TissueSource>().unwrap_err().contains("ventricle, tumour"), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_tumour_is_made_in_the_brain_or_refused_with_the_remedy() {
+        let mut classes = VoxelVolume::isotropic([20; 3], Vec3::ZERO, 1.0, 1u8);
+        classes.data[..20 * 20 * 5].fill(0);
+        let whole = classes.clone();
+        for (ball, part) in
+            [([10.0, 10.0, 1.0, 3.0], "0.0 of its 0.1 ml"), ([90.0, 0.0, 0.0, 3.0], "centre in the brain")]
+        {
+            let fault = make_tumour(ball, &mut classes).unwrap_err().to_string();
+            assert!(fault.starts_with("--tumour") && fault.contains(part), "{fault}");
+            assert!(classes == whole, "nothing is painted");
+        }
+        let note = make_tumour([10.0, 10.0, 8.0, 4.0], &mut classes).unwrap();
+        let made: Vec<usize> = (0..8000).filter(|at| classes.data[*at] == TissueClass::Tumour.code()).collect();
+        assert!(note.contains("ml of brain around 10,10,8") && (200..268).contains(&made.len()), "{}", made.len());
+        assert!(made.iter().all(|at| whole.data[*at] == 1), "brain alone");
     }
 
     #[test]

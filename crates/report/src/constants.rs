@@ -13,6 +13,9 @@ use trepan_measurements::{Row, find};
 
 /// Rows used, by name.
 const USED: &[&str] = &[
+    "aspirator/fastest",
+    "aspirator/removal-rate",
+    "aspirator/spared",
     "brain-living/mooney-ratio",
     "brain-living/poisson",
     "brain-living/swine-ogden-exponent",
@@ -102,6 +105,7 @@ const USED: &[&str] = &[
     "sag/weight",
     "sag/weight-in-fluid",
     "sensitivity/shear-modulus",
+    "shift/landmarks-end",
     "skull/cutting-share-of-cancellous",
     "skull/density-cancellous",
     "skull/density-cortical",

@@ -68,6 +68,8 @@ pub struct Summary {
     pub hand_force_scale: f32,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
+    /// Tissue classes of which an aspirator took something, the most first.
+    pub resected: Vec<Resected>,
     /// Voxels of `removed-label.nii.gz`; `null` without bone.
     pub removed_label: Option<RemovedLabel>,
     /// Pieces of bone cut off the skull, such as a flap, at the end.
@@ -134,6 +136,17 @@ pub struct RemovedLabel {
     pub voxels: usize,
     /// Their volume, mm³; it differs from that of the bone removed by the voxels of the rim.
     pub label_mm3: f64,
+}
+
+/// What an aspirator took of a tissue class.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Resected {
+    /// Name of the class.
+    pub tissue: String,
+    /// Volume taken, mm³.
+    pub taken_mm3: f64,
+    /// Volume left, mm³.
+    pub left_mm3: f64,
 }
 
 /// Pictures of the window while something moved.

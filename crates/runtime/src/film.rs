@@ -30,6 +30,7 @@ use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_link::cell::Reader;
 use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
+use trepan_stages::collision_step::SoftFrame;
 use trepan_stages::notice::Notice;
 
 /// Session time between two shots, ms.
@@ -54,6 +55,8 @@ pub struct Shot {
     /// Displacements of the brain's nodes from rest, in steps of [`NODE_STEP_MM`], in some of the
     /// shots.
     pub nodes: Option<Vec<[i16; 3]>>,
+    /// Tetrahedra of the brain that were resected since the last shot.
+    pub gone: Vec<u32>,
 }
 
 /// Displacements of nodes as a film holds them.
@@ -71,15 +74,17 @@ impl Shot {
     /// As a scene file holds it.
     fn record(&self) -> SceneRecord {
         let View { time_ms, warnings, bone_open: open, removed_mm3, spindle, .. } = self.view;
-        let (voxels, cuts, nodes) = (self.voxels.clone(), self.cuts.clone(), self.nodes.clone());
+        let (voxels, cuts, nodes, gone) =
+            (self.voxels.clone(), self.cuts.clone(), self.nodes.clone(), self.gone.clone());
         let tick = self.view.sample.tick;
-        SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes }
+        SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes, gone }
     }
 
     /// From a scene file, on top of the view of its tick.
     pub fn of(record: SceneRecord, view: View) -> Self {
-        let SceneRecord { time_ms, warnings, open: bone_open, removed_mm3, spindle, voxels, cuts, nodes, .. } = record;
-        Self { view: View { time_ms, warnings, bone_open, removed_mm3, spindle, ..view }, voxels, cuts, nodes }
+        let SceneRecord { time_ms, warnings, open: bone_open, removed_mm3, spindle, voxels, cuts, nodes, gone, .. } =
+            record;
+        Self { view: View { time_ms, warnings, bone_open, removed_mm3, spindle, ..view }, voxels, cuts, nodes, gone }
     }
 
     /// Writes the changes since the last shot into a skull, or takes them back; returns their
@@ -98,6 +103,8 @@ impl Shot {
 pub struct Filming {
     skull: Option<Carved>,
     rest: Vec<Vec3>,
+    /// Which tetrahedra were gone at the last shot.
+    gone: Vec<bool>,
     next_ms: f64,
     brain_every_ms: f64,
     next_brain_ms: f64,
@@ -111,12 +118,17 @@ impl Filming {
     pub fn new(skull: Option<Arc<BoneVolume>>, rest: Vec<Vec3>, length_ms: Option<f64>) -> Self {
         let brain_every_ms = length_ms.map_or(BRAIN_MS, |length_ms| (length_ms / BRAINS).max(SHOT_MS));
         let (skull, last_notices) = (skull.map(Carved::of), (0, None));
-        Self { skull, rest, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }
+        Self { skull, rest, gone: Vec::new(), next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }
     }
 
     /// Takes a shot of a tick if one is due, if there is a new notice, or if it is the last tick.
-    /// `brain` gives the positions of the brain's nodes.
-    pub fn tick<'a>(&mut self, view: View, last: bool, brain: impl FnOnce() -> Option<&'a [Vec3]>) -> Option<Shot> {
+    /// `brain` gives the positions of the brain's nodes, mm, and what is left of its tetrahedra.
+    pub fn tick<'a>(
+        &mut self,
+        view: View,
+        last: bool,
+        brain: impl FnOnce() -> Option<(&'a [Vec3], &'a [u16])>,
+    ) -> Option<Shot> {
         let time_ms = view.time_ms;
         let notices = (view.warnings, view.news);
         let new = std::mem::replace(&mut self.last_notices, notices) != notices;
@@ -128,9 +140,19 @@ impl Filming {
         if moved {
             self.next_brain_ms = time_ms + self.brain_every_ms;
         }
-        let nodes = moved.then(brain).flatten().map(|positions| displacements(positions, &self.rest));
+        let brain = moved.then(brain).flatten();
+        let nodes = brain.map(|(positions, _)| displacements(positions, &self.rest));
+        let gone = self.newly_gone(brain.map_or(&[], |(_, fills)| fills));
         let (voxels, cuts) = self.skull.as_mut().map(Carved::changes).unwrap_or_default();
-        Some(Shot { view, voxels, cuts, nodes })
+        Some(Shot { view, voxels, cuts, nodes, gone })
+    }
+
+    fn newly_gone(&mut self, fills: &[u16]) -> Vec<u32> {
+        self.gone.resize(self.gone.len().max(fills.len()), false);
+        let new = |(tet, (gone, fill)): (usize, (&mut bool, &u16))| {
+            (*fill == 0 && !std::mem::replace(gone, *fill == 0)).then_some(tet as u32)
+        };
+        self.gone.iter_mut().zip(fills).enumerate().filter_map(new).collect()
     }
 
     /// Films a live session into its scene file until it is over; returns why the film ended early.
@@ -138,15 +160,15 @@ impl Filming {
         mut self,
         mut writer: SceneWriter,
         mut view: Reader<View>,
-        mut brain: Option<Reader<Vec<Vec3>>>,
+        mut brain: Option<Reader<SoftFrame>>,
         stop: &Stop,
     ) -> Option<String> {
         let mut fault = None;
         loop {
             let (now, over) = (*view.latest().0, stop.asked());
             let last = over || now.finished;
-            let positions = brain.as_mut().map(|brain| brain.latest().0.as_slice());
-            let shot = self.tick(now, last, || positions);
+            let brain = brain.as_mut().map(|brain| brain.latest().0);
+            let shot = self.tick(now, last, || brain.map(|brain| (&brain.positions[..], &brain.fills[..])));
             if let (None, Some(shot)) = (&fault, &shot) {
                 fault = writer.write(&shot.record()).err();
             }
@@ -262,7 +284,8 @@ mod tests {
             assert!(carved.cut_writer().set(2 * place, random.i16(0..CUT_SURFACE)));
             let taken = filming.next_ms <= f64::from(ms);
             let brain = [Vec3::splat(0.1 * ms as f32)];
-            shots.extend(filming.tick(view(ms.into()), ms == 999, || Some(&brain)));
+            let fills = [1000 - ms as u16, if ms < 500 { 7 } else { 0 }];
+            shots.extend(filming.tick(view(ms.into()), ms == 999, || Some((&brain, &fills))));
             if taken || ms == 999 {
                 states.push(state(&carved));
             }
@@ -276,6 +299,9 @@ mod tests {
             shot.write(&shown, false);
         }
         assert!(state(&shown) == state(&made(&volume)));
+        let gone: Vec<_> =
+            shots.iter().flat_map(|shot| shot.gone.iter().map(|tet| (*tet, shot.view.time_ms))).collect();
+        assert!(matches!(gone[..], [(1, ms)] if (500.0..540.0).contains(&ms)), "once: {gone:?}");
         let last = shots.last().and_then(|shot| shot.nodes.clone()).unwrap();
         assert!(position(Vec3::ZERO, last[0]).distance(Vec3::splat(99.9)) < NODE_STEP_MM);
     }
@@ -294,7 +320,7 @@ mod tests {
     #[test]
     fn long_films_hold_fewer_brains() {
         let mut filming = Filming::new(None, Vec::new(), Some(3.6e6));
-        let shots = (0..10_000).filter_map(|ms| filming.tick(view(ms.into()), false, || Some(&[])));
+        let shots = (0..10_000).filter_map(|ms| filming.tick(view(ms.into()), false, || Some((&[], &[]))));
         let kept: Vec<bool> = shots.map(|shot| shot.nodes.is_some()).collect();
         assert!(kept.len() > 280 && kept.iter().filter(|kept| **kept).count() == 10, "{}", kept.len());
     }

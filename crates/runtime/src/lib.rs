@@ -198,8 +198,8 @@ pub struct Cells {
     pub shown: (Writer<SoftFrame>, Reader<SoftFrame>),
     /// Haptic loop to the film.
     pub filmed: (Writer<View>, Reader<View>),
-    /// Solver loop to the film: node positions, mm.
-    pub nodes: (Writer<Vec<Vec3>>, Reader<Vec<Vec3>>),
+    /// Solver loop to the film.
+    pub filmed_soft: (Writer<SoftFrame>, Reader<SoftFrame>),
 }
 
 impl Cells {
@@ -209,15 +209,16 @@ impl Cells {
         if let Some(tissue) = &stages.tissue {
             tissue.solver.publish(&mut frame);
         }
+        let loads = Loads { contacts: NodalContacts::with_room(), fills: frame.fills.clone(), ..Loads::default() };
         let view = View::at(sample, stages.haptic.guard().config().max_force_n);
         Self {
             tool: cell(sample),
             view: cell(view),
             patch: cell((0, SurfacePatch::default())),
-            loads: cell((0, Loads { contacts: NodalContacts::with_room(), ..Loads::default() })),
+            loads: cell((0, loads)),
             soft: cell(frame.clone()),
             filmed: cell(view),
-            nodes: cell(frame.positions.clone()),
+            filmed_soft: cell(frame.clone()),
             shown: cell(frame),
         }
     }
@@ -362,6 +363,9 @@ pub struct SolverOutcome {
     /// Faults of the solver, summed over steps.
     #[serde(flatten)]
     pub solver_faults: SolverFaults,
+    /// What is left of each tetrahedron, of 65535; empty where nothing could be resected.
+    #[serde(skip)]
+    pub fills: Vec<u16>,
 }
 
 impl SolverOutcome {
@@ -372,6 +376,7 @@ impl SolverOutcome {
             max_displacement_mm: stage.max_displacement_mm(),
             end_displacement_mm: stage.displacement_mm(),
             solver_faults: *stage.solver_faults(),
+            fills: stage.fills().to_vec(),
             ..Self::default()
         }
     }

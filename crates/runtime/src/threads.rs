@@ -20,7 +20,6 @@ use crate::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, 
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_contact::{GuardedWrench, SurfacePatch};
-use trepan_geometry::Vec3;
 use trepan_haptics::{HapticDevice, Status};
 use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
@@ -136,10 +135,7 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
             record.compute_us = us;
             ends.records.send(record);
             ends.shown.write(|frame| stage.publish(frame));
-            ends.nodes.write(|nodes| {
-                nodes.clear();
-                nodes.extend_from_slice(stage.positions());
-            });
+            ends.filmed.write(|frame| stage.publish(frame));
         }
     }
     let span_ms = (clock.now_ms() - begin_ms).max(1e-3);
@@ -166,15 +162,15 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
         let (tool, view, patch) = (cells.tool.0, cells.view.0, cells.patch.1);
         let ends = HapticEnds { tool, view, filmed: cells.filmed.0, patch, ticks, notices };
-        let nodes = simulating.then_some(cells.nodes.1);
-        let filming = scene.map(|(film, writer)| scope.spawn(move || film.live(writer, cells.filmed.1, nodes, stop)));
+        let brain = simulating.then_some(cells.filmed_soft.1);
+        let filming = scene.map(|(film, writer)| scope.spawn(move || film.live(writer, cells.filmed.1, brain, stop)));
         let feeling = scope.spawn(move || haptic_loop(hands, ends, clock, pace, stop));
         let solving = tissue.map(|tissue| {
             let (tool, soft, patch, loads) = (cells.tool.1, cells.soft.1, cells.patch.0, cells.loads.0);
             let ends = CollisionEnds { tool, soft, patch, loads, records: collisions };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
-            let (soft, shown, nodes) = (cells.soft.0, cells.shown.0, cells.nodes.0);
-            let ends = SolverEnds { loads: cells.loads.1, soft, shown, nodes, records: solver };
+            let (soft, shown, filmed) = (cells.soft.0, cells.shown.0, cells.filmed_soft.0);
+            let ends = SolverEnds { loads: cells.loads.1, soft, shown, filmed, records: solver };
             (colliding, scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop)))
         });
         picture(inputs);
@@ -299,7 +295,7 @@ struct SolverEnds {
     loads: Reader<Numbered<Loads>>,
     soft: Writer<SoftFrame>,
     shown: Writer<SoftFrame>,
-    nodes: Writer<Vec<Vec3>>,
+    filmed: Writer<SoftFrame>,
     records: Sender<SolverRecord>,
 }
 

@@ -210,11 +210,11 @@ pub(crate) fn cache(patient: &Patient) -> Result<Cache, SessionError> {
 
 /// Given input files; those of the built-in case if none is given.
 pub(crate) fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
-    let Patient { ct, mri, labels, tissues, .. } = patient.clone();
+    let Patient { ct, mri, labels, tissues, tumour, .. } = patient.clone();
     if ct.is_none() && mri.is_none() && labels.is_none() && tissues.is_empty() {
-        return built_in;
+        return Inputs { tumour, ..built_in };
     }
-    Inputs { name: None, ct, mri, labels, tissues }
+    Inputs { name: None, ct, mri, labels, tissues, tumour }
 }
 
 #[cfg(test)]
@@ -237,6 +237,7 @@ mod tests {
             mri: Some(head.mri),
             labels: Some(head.labels),
             tissues,
+            ..Inputs::default()
         };
         let patient = Options::try_parse_from(["x"]).unwrap().patient;
         let (cache, recipe) = (Cache::at(home.path().into()), recipe(&patient));

@@ -83,15 +83,22 @@ fn refused(fault: impl std::fmt::Display) -> SessionError {
     SessionError::Device(fault.to_string())
 }
 
-/// Duration of a scripted operation, and of one that cuts a flap, s.
-const SCRIPT_S: (f64, f64) = (20.0, 75.0);
+/// Duration of a scripted operation, s: of one that cuts a flap, of a resection by what it takes,
+/// of others.
+fn script_s(name: &str, plan: &Plan) -> f64 {
+    match (name, plan.target) {
+        ("flap", _) => 75.0,
+        ("resect", target) => 60.0 + target.map_or(60.0, |target| 0.43 * f64::from(target.radius_mm).powi(3)),
+        _ => 20.0,
+    }
+}
 
 /// Makes the script of an operation that follows a plan.
 fn scripted(name: &str, program: Program, options: &Options, plan: &Plan) -> Result<Script, ScriptError> {
-    let usual_s = if name == "flap" { SCRIPT_S.1 } else { SCRIPT_S.0 };
     let usual = if program.has_tissue() { script::Plan::default() } else { script::Plan::of_bone() };
-    let how = script::Plan { outline: plan.outline.clone(), ..usual };
-    Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how)
+    let how =
+        script::Plan { outline: plan.outline.clone(), is_open: !program.has_bone(), target: plan.target, ..usual };
+    Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(script_s(name, plan)), &how)
 }
 
 /// Offset of the second hand's workspace to the left of the first one's, mm.

@@ -4,15 +4,17 @@
 use crate::options::Options;
 use serde::{Deserialize, Serialize};
 use trepan_haptics::DeviceName;
-use trepan_measurements::{brain_living, support};
+use trepan_measurements::{aspirator, brain_living, support};
 use trepan_patient::TissueClass;
 
-/// Default diameter of the flap that script `flap` cuts, mm.
+/// Default diameter of the flap that the scripts `flap` and `resect` cut, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
 /// Default factor by which the fluid drains faster than in a patient.
 const CSF_SPEED_UP: f32 = support::DRAIN_SPEED_UP.f32();
 /// Default Young's modulus of the brain in a slow test, kPa.
 const YOUNG_KPA: f32 = brain_living::YOUNG_MODULUS.f32();
+/// Default rate at which an aspirator takes brain tissue, mm/s.
+const ASPIRATION_MM_S: f32 = aspirator::REMOVAL_RATE.f32();
 /// Default haptic tick rate, Hz, numerical.
 const RATE_HZ: f32 = 1000.0;
 
@@ -33,6 +35,8 @@ pub(crate) struct Operation {
     pub forbidden: Vec<TissueClass>,
     /// Young's modulus of the brain, kPa.
     pub young_modulus_kpa: f32,
+    /// Brain that the aspirator takes in a second for each area in contact, mm/s; 0 for none.
+    pub aspiration_mm_s: f32,
     /// Haptic tick rate, Hz.
     pub rate_hz: f32,
     /// Whether the brain's tools require an open skull; false for a watcher.
@@ -50,6 +54,7 @@ impl Default for Operation {
             csf_speed_up: CSF_SPEED_UP,
             forbidden: vec![TissueClass::Vessel],
             young_modulus_kpa: YOUNG_KPA,
+            aspiration_mm_s: ASPIRATION_MM_S,
             rate_hz: RATE_HZ,
             opening_needed: true,
             force_waits: true,
@@ -60,7 +65,8 @@ impl Default for Operation {
 impl Operation {
     /// Takes settings from the options, and missing ones from the replayed recording, if any.
     pub fn of(options: &Options, device: &DeviceName, recorded: Option<&Self>) -> Self {
-        let flap_mm = if device.operation() == Some("flap") { SCRIPTED_FLAP_MM } else { 0.0 };
+        let cuts_flap = matches!(device.operation(), Some("flap" | "resect"));
+        let flap_mm = if cuts_flap { SCRIPTED_FLAP_MM } else { 0.0 };
         let base = recorded.cloned().unwrap_or_else(|| Self { flap_mm, ..Self::default() });
         let keeps_line = options.flap_line.is_empty() && options.flap.is_none();
         // A watcher does not see the bone that was drilled before it joined.
@@ -72,6 +78,7 @@ impl Operation {
             csf_speed_up: options.csf_speed_up.unwrap_or(base.csf_speed_up),
             forbidden: options.forbid.clone().unwrap_or(base.forbidden),
             young_modulus_kpa: options.young_modulus_kpa.unwrap_or(base.young_modulus_kpa),
+            aspiration_mm_s: options.aspiration.unwrap_or(base.aspiration_mm_s),
             rate_hz: options.rate_hz.unwrap_or(base.rate_hz),
             opening_needed: base.opening_needed && !watches,
             force_waits: base.force_waits && !watches,
@@ -91,7 +98,7 @@ mod tests {
         let usual = Operation::of(&parse("x"), &DeviceName::MOUSE, None);
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, None, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
-        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --rate-hz 500 --watch other";
+        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --aspiration 0.5 --rate-hz 500 --watch other";
         let drawn = Options { flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]], ..parse(line) };
         let given = Operation::of(&drawn, &script, None);
         assert!(!given.opening_needed && usual.opening_needed && usual.force_waits);

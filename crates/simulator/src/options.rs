@@ -16,6 +16,8 @@ use trepan_stages::program::Program;
 
 /// Numerical range of `--young-modulus-kpa`.
 pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
+/// Numerical range of `--aspiration`, mm/s.
+pub(crate) const ASPIRATIONS_MM_S: [f64; 2] = [0.0, 50.0];
 /// Numerical range of `--csf-speed-up`.
 pub(crate) const CSF_SPEED_UPS: [f64; 2] = [1.0, 1000.0];
 /// Numerical range of `--rate-hz`.
@@ -29,7 +31,7 @@ pub struct Options {
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
-    #[arg(help_heading = "Patient", long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening"])]
+    #[arg(help_heading = "Patient", long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening", "tumour"])]
     pub case: Option<PathBuf>,
     /// Images and how they are imported
     #[command(flatten)]
@@ -153,6 +155,10 @@ pub struct Options {
     /// hour; a replay's as recorded]
     #[arg(help_heading = "Models and accuracy", long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub csf_speed_up: Option<f32>,
+    /// Brain that the aspirator takes for each area in contact, mm/s, 0 to 50 [default: 8,
+    /// uncalibrated; a replay's as recorded]
+    #[arg(help_heading = "Models and accuracy", long, value_name = "MM/S", allow_negative_numbers = true)]
+    pub aspiration: Option<f32>,
     /// Tissue classes (as for --tissue) that raise a warning when a tool comes close, separated by
     /// commas [default: vessel]
     #[arg(help_heading = "Session", long, value_name = "CLASS,...", value_delimiter = ',')]
@@ -220,6 +226,9 @@ pub struct Patient {
     /// all voxel sizes
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub opening: Option<[f32; 3]>,
+    /// Make a tumour: centre and radius, RAS mm; the opening is over it
+    #[arg(long, value_name = "X,Y,Z,R", value_parser = tumour, allow_hyphen_values = true)]
+    pub tumour: Option<[f32; 4]>,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
     #[arg(long, value_name = "HU", allow_negative_numbers = true)]
     pub isovalue_hu: Option<i16>,
@@ -265,7 +274,7 @@ pub enum Task {
     /// better and the next cheaper choice cost
     Plan {
         /// A folder that `case build` made
-        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening"])]
+        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening", "tumour"])]
         case: Option<PathBuf>,
         /// The patient's images
         #[command(flatten)]
@@ -471,6 +480,14 @@ fn point(text: &str) -> Result<[f32; 3], String> {
     if point.iter().all(|v| v.abs() <= 1e4) { Ok(point) } else { Err(remedy.into()) }
 }
 
+fn tumour(text: &str) -> Result<[f32; 4], String> {
+    let remedy =
+        "expected X,Y,Z,R in mm: right, anterior and superior positive, then a radius of 2 to 40, as in 30,40,80,7.5";
+    let (place, radius) = text.rsplit_once(',').ok_or(remedy)?;
+    let ([x, y, z], radius) = (point(place).map_err(|_| remedy)?, radius.trim().parse().map_err(|_| remedy)?);
+    if (2.0..=40.0).contains(&radius) { Ok([x, y, z, radius]) } else { Err(remedy.into()) }
+}
+
 fn quality(text: &str) -> Result<Quality, String> {
     let names = || Quality::ALL.map(Quality::name).join(", ");
     Quality::ALL.into_iter().find(|known| known.name() == text).ok_or_else(|| format!("give one of {}", names()))
@@ -543,6 +560,7 @@ impl Options {
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
         within("csf-speed-up", self.csf_speed_up.unwrap_or(1.0).into(), CSF_SPEED_UPS[0], CSF_SPEED_UPS[1])?;
         within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;
+        within("aspiration", self.aspiration.unwrap_or(0.0).into(), ASPIRATIONS_MM_S[0], ASPIRATIONS_MM_S[1])?;
         rate(self.rate_hz.map_or(RATES_HZ[0], f64::from))?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }
@@ -602,6 +620,11 @@ mod tests {
         assert!(parse("x --force-scale 2").unwrap().check().unwrap_err().to_string().contains("0.01 to 1"));
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
+        assert_eq!(parse("x --tumour -40,30.5,80,7.5").unwrap().patient.tumour, Some([-40.0, 30.5, 80.0, 7.5]));
+        for bad in ["1,2,3", "1,2,3,0", "1,2,3,-5", "1,2,3,nan", "1,2,nan,5", "1,2,3,99", "a"] {
+            let fault = parse(&format!("x --tumour {bad}")).unwrap_err().to_string();
+            assert!(fault.contains("radius of 2 to 40"), "{fault}");
+        }
         assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());
         assert!(parse("x --quality best").unwrap_err().to_string().contains("auto, draft, usual, fine"));
         assert_eq!(parse("x --quality fine").unwrap().quality, Some(Quality::Fine));

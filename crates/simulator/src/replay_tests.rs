@@ -99,13 +99,22 @@ fn hand(ms: u64) -> ToolState {
     ToolState { time_ms: ms as f64, buttons, ..ToolState::at(pose) }
 }
 
-/// Runs the operation, each loop as if it kept pace.
-fn operated(line: &str) -> (Recording, SessionSetup) {
-    operated_cheaper(line, END)
+/// The same with the aspirator instead of burr and probe, its pedal down on the brain.
+fn aspirating(ms: u64) -> ToolState {
+    let ToolState { world_from_tool, .. } = hand(ms.max(PROBE));
+    let buttons = if ms < PROBE + 50 { Buttons::take(ToolKind::Aspirator) } else { Buttons::PEDAL };
+    ToolState { time_ms: ms as f64, buttons, ..ToolState::at(world_from_tool) }
 }
 
-/// The same, with the cheaper solver from a tick on.
-fn operated_cheaper(line: &str, cheaper_from: u64) -> (Recording, SessionSetup) {
+/// Runs the operation, each loop as if it kept pace.
+fn operated(line: &str) -> (Recording, SessionSetup) {
+    let (recording, setup, _) = operated_by(hand, line, END);
+    (recording, setup)
+}
+
+/// The same by a hand, with the cheaper solver from a tick on; also what is left of each
+/// tetrahedron.
+fn operated_by(hand: fn(u64) -> ToolState, line: &str, cheaper_from: u64) -> (Recording, SessionSetup, Vec<u16>) {
     let setup = setup(&format!("--quality usual {line}"), None);
     let Stages { mut haptic, tissue, .. } = stages(&setup);
     let mut tissue = tissue.expect("the program has tissue");
@@ -131,7 +140,7 @@ fn operated_cheaper(line: &str, cheaper_from: u64) -> (Recording, SessionSetup) 
     assert_eq!((faults.contacts_left_out, faults.restless_steps), (0, 0), "{line}");
     let config = setup.models.config(setup.ingredients());
     recording.header.config = SessionConfig { operation: setup.operation.clone(), ..config }.entries();
-    (recording, setup)
+    (recording, setup, tissue.solver.fills().to_vec())
 }
 
 /// Ticks that give the same force when the recording is replayed by its header.
@@ -241,7 +250,7 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
     let line = "--set element=locking-free,law=stiffening,relaxation=prony,threads=2";
     // While the probe is deep in the brain, which has relaxed under it.
     let from = 1050;
-    let [(plain, _), (cheaper, _)] = [END, from].map(|from| operated_cheaper(line, from));
+    let [(plain, ..), (cheaper, ..)] = [END, from].map(|from| operated_by(hand, line, from));
     assert_eq!(replayed(&cheaper).0, END - 1);
     let records = |recording: &Recording| recording.solver.iter().filter(|record| record.cheaper > 0).count();
     assert!(records(&plain) == 0 && records(&cheaper) > 100);
@@ -253,6 +262,22 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
     let most = |of: &[f32]| of.iter().copied().fold(0.0, f32::max);
     // Without the stress memory it is 0.019 N, with it 0.0015.
     assert!(most(before) == 0.0 && most(after) > 0.0 && most(after) < 0.004, "{} N, {} N", most(before), most(after));
+}
+
+#[test]
+fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
+    let (recording, setup, fills) = operated_by(aspirating, "--set element=locking-free --aspiration 50", 1100);
+    let resected = setup.resected(&fills);
+    let taken_mm3: f64 = resected.iter().map(|resected| resected.taken_mm3).sum();
+    assert!(taken_mm3 > 30.0 && resected.len() == 2 && resected[0].tissue == "brain", "{resected:?}");
+    assert!(fills.iter().any(|fill| (1..u16::MAX).contains(fill)));
+    assert_eq!(replayed(&recording).0, END - 1);
+    let (pressed, without, whole) = operated_by(aspirating, "--set element=locking-free --aspiration 0", 1100);
+    assert!(whole.is_empty() && without.resected(&whole).is_empty());
+    let sum_n = |recording: &Recording| recording.ticks.iter().map(|tick| tick.wrench.force.length()).sum::<f32>();
+    assert!(sum_n(&recording) < 0.97 * sum_n(&pressed), "{} {} N", sum_n(&recording), sum_n(&pressed));
+    let (_, rival, whole) = operated_by(aspirating, "--set search=hashed-grid", END);
+    assert!(whole.is_empty() && rival.no_aspiration().is_some_and(|why| why.contains("search=walk")));
 }
 
 #[test]

@@ -236,7 +236,8 @@ impl Session {
         let ended = watching.and_then(|watching| watching.ended());
         ended.iter().for_each(|text| tracing::info!("{text}"));
         let recording = Recording::open(&record)?;
-        self.map(&mut album, &recording);
+        let fills = outcome.solver.as_ref().map_or(&[][..], |solver| &solver.fills);
+        self.map(&mut album, &recording, fills);
         let mut remarks = self.setup.scene.remarks.clone();
         remarks.extend(self.setup.models.unmet.iter().cloned());
         let (lack, unlike) = self.replay_remarks();
@@ -256,6 +257,7 @@ impl Session {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
             plan: self.setup.bone().and_then(|bone| PlanComparison::of(&self.setup.plan, bone)),
             regions: self.setup.regions(&recording),
+            resected: outcome.solver.as_ref().map_or_else(Vec::new, |solver| self.setup.resected(&solver.fills)),
             remarks,
             machine: Machine::here(adapter),
             ..self.about(&album)
@@ -423,7 +425,7 @@ impl Session {
             return Err(NoPicture::NotRequested);
         }
         let gpu = drawing.unwrap_or_else(driver::open);
-        Ok(Graphics::open(&self.setup, self.options.picture, gpu, self.windowed())?)
+        Ok(Graphics::open(&self.setup, self.options.picture, gpu)?)
     }
 
     fn picture(
@@ -470,12 +472,12 @@ impl Session {
 
     /// Inserts sharp pictures of the opening and of faults, and the final colour maps, before the
     /// session's pictures.
-    fn map(&self, album: &mut Album, recording: &Recording) {
+    fn map(&self, album: &mut Album, recording: &Recording, fills: &[u16]) {
         let Some(painter) = &mut album.painter else { return };
         let folder = self.out.join("frames");
         // In a window the pictures of the session are as coarse as its frame rate wants.
         let sharp = painter.set_quality(false, 1.0).map_err(SessionError::from).map(|()| {
-            let close = self.setup.close_pictures(painter, recording, &folder);
+            let close = self.setup.close_pictures(painter, recording, fills, &folder);
             close.into_iter().chain(self.setup.maps(painter, recording, &folder)).collect::<Vec<_>>()
         });
         let of_session = std::mem::take(&mut album.shots);
@@ -628,7 +630,7 @@ mod tests {
         let head = trepan_fixtures::case_head();
         let tissues = TissueSource::regions_of_aseg(head.aseg);
         let (ct, mri, labels) = (Some(head.ct), Some(head.mri), Some(head.labels));
-        let built_in = Inputs { name: Some(head.name), ct, mri, labels, tissues };
+        let built_in = Inputs { name: Some(head.name), ct, mri, labels, tissues, ..Inputs::default() };
         let fixed = ["x", "--headless", "--frames-per-second", "0", "--quality", "draft"];
         let mut options = Options::try_parse_from(fixed).unwrap();
         options.patient.cache = Some(home.join("cases"));

@@ -8,18 +8,20 @@ use std::sync::{Arc, OnceLock};
 use trepan_bone::{BoneVolume, Piece};
 use trepan_budget::Bone;
 use trepan_geometry::{ToolState, Vec3, units};
+use trepan_haptics::script::Target;
 use trepan_link::Recording;
-use trepan_measurements::support;
+use trepan_measurements::{aspirator, shift, support};
 use trepan_mesh::TetMesh;
-use trepan_models::ingredients::{Ingredients, Support};
+use trepan_models::ingredients::{Ingredients, SolverDevice, Support};
 use trepan_models::methods;
 use trepan_models::solver::{self, SolverInfo};
 use trepan_patient::Case;
 use trepan_patient::Plan;
 use trepan_patient::anchors::BrainSupport;
 use trepan_patient::remark;
-use trepan_patient::{RestBrain, Scene};
+use trepan_patient::{RestBrain, Scene, TissueClass};
 use trepan_report::regions::{Region, regions};
+use trepan_report::summary::Resected;
 use trepan_rigid::{Extent, Method};
 use trepan_runtime::{Stages, Tissue};
 use trepan_stages::collision_step::CollisionStage;
@@ -30,6 +32,9 @@ use trepan_stages::second_hand::SecondHand;
 use trepan_stages::settling::Settling;
 use trepan_stages::solver_step::SolverStage;
 use trepan_voxel_size::{CostModel, Measures};
+
+/// How far a tumour sinks over what the cortex does, in the built-in case, numerical.
+const SINKS: f32 = 0.7;
 
 /// Patient, plan, settings and models of a session.
 pub(crate) struct SessionSetup {
@@ -74,8 +79,12 @@ impl SessionSetup {
             filmed: filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?,
             ran: OnceLock::new(),
         };
-        let usual = if setup.is_anchored() { support::CSF_LOSS } else { support::CSF_LOSS_UNIFORM };
-        setup.operation.csf_loss.get_or_insert(usual.f32());
+        let anchored = setup.is_anchored();
+        let usual = if anchored { support::CSF_LOSS } else { support::CSF_LOSS_UNIFORM };
+        let loss = *setup.operation.csf_loss.get_or_insert(usual.f32());
+        if let Some(target) = setup.plan.target.as_mut().filter(|_| anchored) {
+            target.sinks_mm = SINKS * shift::LANDMARKS_END.f32() * loss / usual.f32();
+        }
         Ok(setup)
     }
 
@@ -97,6 +106,21 @@ impl SessionSetup {
     /// Forces on the brain by region, from a recording.
     pub fn regions(&self, recording: &Recording) -> Vec<Region> {
         self.brain().map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
+    }
+
+    /// What is missing of each tissue class with what is left of each tetrahedron, of 65535.
+    pub fn resected(&self, fills: &[u16]) -> Vec<Resected> {
+        let Some(brain) = self.brain().filter(|_| !fills.is_empty()) else { return Vec::new() };
+        let (whole, left) = (brain.left_mm3(&vec![u16::MAX; fills.len()]), brain.left_mm3(fills));
+        let of = |(class, (whole, left_mm3)): (TissueClass, (f64, f64))| Resected {
+            tissue: class.name().into(),
+            taken_mm3: whole - left_mm3,
+            left_mm3,
+        };
+        let all = TissueClass::ALL.into_iter().zip(whole.into_iter().zip(left)).map(of);
+        let mut some: Vec<Resected> = all.filter(|resected| resected.taken_mm3 > 0.0).collect();
+        some.sort_by(|a, b| b.taken_mm3.total_cmp(&a.taken_mm3));
+        some
     }
 
     /// Name of the tissue solver that runs.
@@ -196,7 +220,43 @@ impl SessionSetup {
             .under_pressure(with.surface_pressure_mmhg > 0.0)
             .turning(rigid.descriptor().extent == Extent::BallAndShaft)
             .settling(settling);
-        Ok(Tissue { collision, solver: SolverStage::new(solver) })
+        let solver = SolverStage::new(solver);
+        let rates = self.aspiration_rates(brain, with);
+        if rates.is_empty() {
+            return Ok(Tissue { collision, solver });
+        }
+        let collision = collision.aspirating(&brain.mesh, &rates).map_err(|fault| brain_error(&fault))?;
+        Ok(Tissue { collision, solver: solver.resectable(rates.len()) })
+    }
+
+    /// Rate at which an aspirator takes each tetrahedron, mm/ms, by its stiffness against that of
+    /// brain; empty where none is taken.
+    fn aspiration_rates(&self, brain: &RestBrain, with: &Ingredients) -> Vec<f32> {
+        let mm_ms = 1e-3 * self.operation.aspiration_mm_s;
+        if mm_ms <= 0.0 || self.no_aspiration().is_some() {
+            return Vec::new();
+        }
+        let materials = brain.materials(with.materials(self.young_mpa));
+        let usual_mpa = materials[TissueClass::Brain as usize].shear_mpa();
+        let rate = |code: &u8| {
+            let softer = (usual_mpa / materials[usize::from(code.saturating_sub(1))].shear_mpa()) as f32;
+            let is_spared = softer * aspirator::SPARED.f32() <= 1.0;
+            if is_spared { 0.0 } else { mm_ms * softer.min(aspirator::FASTEST.f32()) }
+        };
+        brain.class_of_tet.iter().map(rate).collect()
+    }
+
+    /// Why the aspirator takes no tissue with these models; `None` where it does.
+    pub fn no_aspiration(&self) -> Option<String> {
+        let with = self.models.ingredients();
+        let device = self.ran.get().map_or(with.device, |ran| ran.device);
+        let remedy = match (methods::solver(self.models.setup.tissue.solver), with.search, device) {
+            (Some(_), ..) => "the solver tled",
+            (_, search, _) if search != trepan_deformable::Method::RECOMMENDED => "search=walk",
+            (.., SolverDevice::Gpu) => "device=cpu",
+            _ => return None,
+        };
+        Some(format!("the aspirator takes no tissue with these models: it needs {remedy}"))
     }
 }
 
@@ -220,13 +280,16 @@ fn brain_error(fault: &dyn std::fmt::Display) -> SessionError {
 /// Plans the removal of bone; refuses a flap that the skull does not surround.
 fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
     let hole_mm = Program::Craniotomy.tray()[0].tip_radius_mm;
+    let target = scene.brain.as_ref().and_then(RestBrain::tumour);
+    let target = target.map(|(centre, radius_mm)| Target { centre, radius_mm, sinks_mm: 0.0 });
     let line: Vec<Vec3> = operation.flap_line.iter().copied().map(Vec3::from).collect();
     if let (Some(bone), false) = (&scene.bone, line.is_empty()) {
         let fault = "the line of the flap is not on the skull around the opening; draw it again on the case's page";
-        return Plan::drawn(bone, scene.site, hole_mm, &line).ok_or_else(|| SessionError::Usage(fault.into()));
+        let plan = Plan::drawn(bone, scene.site, hole_mm, &line).ok_or_else(|| SessionError::Usage(fault.into()))?;
+        return Ok(plan.with_target(target));
     }
     let plan = Plan::new(scene.bone.as_deref(), scene.site, hole_mm, 0.5 * operation.flap_mm);
-    plan.ok_or_else(|| {
+    plan.map(|plan| plan.with_target(target)).ok_or_else(|| {
         let fault = format!(
             "--flap {}: the skull does not surround the flap: give a smaller one, or another --opening",
             operation.flap_mm

@@ -77,6 +77,8 @@ pub struct SoftFrame {
     pub positions: Vec<Vec3>,
     /// Node velocities, mm/ms.
     pub velocities: Vec<Vec3>,
+    /// What is left of each tetrahedron, of 65535; empty where nothing was resected.
+    pub fills: Vec<u16>,
 }
 
 /// Contact of the brain's surface with itself: springs between a border node and the triangle that
@@ -290,6 +292,7 @@ mod tests {
             step: 1,
             time_ms: 1.0,
             positions,
+            fills: Vec::new(),
         };
         let open = |folds: bool| {
             let stage = CollisionStage::new(Program::Brain, &mesh, &Config::default(), None).unwrap();

@@ -107,8 +107,15 @@ impl Phase {
 /// How many of the tray's tools cut bone; they come first.
 const BONE_TOOLS: usize = 4;
 /// Every tool.
-const TRAY: [Tool; 6] =
-    [Tool::burr(3.0), Tool::burr(2.0), Tool::perforator(), Tool::craniotome(), Tool::probe(2.0), Tool::spatula()];
+const TRAY: [Tool; 7] = [
+    Tool::burr(3.0),
+    Tool::burr(2.0),
+    Tool::perforator(),
+    Tool::craniotome(),
+    Tool::probe(2.0),
+    Tool::spatula(),
+    Tool::aspirator(),
+];
 
 /// Name of a tool in the tray: its kind and width.
 pub fn called(tool: &Tool) -> String {

@@ -263,6 +263,18 @@ impl SolverStage {
         frame.positions.extend_from_slice(self.solver.positions());
         frame.velocities.clear();
         frame.velocities.extend_from_slice(self.solver.velocities());
+        frame.fills.clone_from(&self.loads.fills);
+    }
+
+    /// Makes room for what an aspirator leaves of a number of tetrahedra.
+    pub fn resectable(mut self, tets: usize) -> Self {
+        self.loads.fills = vec![u16::MAX; tets];
+        self
+    }
+
+    /// What is left of each tetrahedron, of 65535; empty where nothing can be resected.
+    pub fn fills(&self) -> &[u16] {
+        &self.loads.fills
     }
 
     /// Returns the largest displacement of a node from its rest position, mm.

@@ -94,12 +94,12 @@ mod tests {
         assert_eq!(ask(Buttons::NEXT_TOOL, true, true), (Some(Change::Taken), 1));
         assert_eq!(ask(Buttons::take(ToolKind::Burr), true, true), (Some(Change::Taken), 0), "the other burr");
         assert_eq!(ask(Buttons::take(ToolKind::Burr), true, true), (None, 0));
-        assert_eq!(ask(Buttons::take(ToolKind::Aspirator), true, true), (None, 0), "not in the tray");
         assert_eq!(ask(Buttons::slot(3), false, true), (Some(Change::Busy), 0));
         assert_eq!(ask(Buttons::slot(3), false, true), (None, 0), "reported once");
         assert_eq!(ask(Buttons::slot(3), true, true), (Some(Change::Taken), 3), "tried until free");
         assert_eq!(ask(Buttons::slot(14), true, true), (None, 3));
         assert_eq!(ask(Buttons::take(ToolKind::Spatula), true, true), (Some(Change::Taken), 5));
+        assert_eq!(ask(Buttons::take(ToolKind::Aspirator), true, true), (Some(Change::Taken), 6));
         ask(NONE, true, true);
         assert_eq!(ask(Buttons::NEXT_TOOL, true, false), (Some(Change::Taken), 0), "back to the bone");
     }

@@ -148,10 +148,16 @@ fn wide(ui: &egui::Ui, text: RichText, height: f32) -> egui::Button<'static> {
 
 /// The button that is held down to drill.
 fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
-    if !panel.by_hand || panel.no_bone {
+    if !panel.by_hand || panel.no_bone && !panel.aspirates {
         return;
     }
-    let name = RichText::new(tr(if panel.drilling { "Drilling (Space)" } else { "Hold to drill (Space)" })).strong();
+    let name = match (panel.aspirates, panel.drilling) {
+        (false, false) => "Hold to drill (Space)",
+        (false, true) => "Drilling (Space)",
+        (true, false) => "Hold to aspirate (Space)",
+        (true, true) => "Aspirating (Space)",
+    };
+    let name = RichText::new(tr(name)).strong();
     let pedal = match panel.drilling {
         true => wide(ui, name.color(Color32::BLACK), 32.0).fill(ORANGE),
         false => wide(ui, name, 32.0),

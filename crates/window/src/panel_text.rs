@@ -16,8 +16,10 @@ pub struct Panel {
     pub tool: String,
     /// Whether mouse and keys move the tool; then pedal, next tool and undo are shown.
     pub by_hand: bool,
-    /// Whether the drill runs.
+    /// Whether the drill or the aspirator runs.
     pub drilling: bool,
+    /// Whether the pedal runs an aspirator.
+    pub aspirates: bool,
     /// The current sounds of drill and alarm.
     pub sound: Sound,
     /// Largest force since the last picture, N.

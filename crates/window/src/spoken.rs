@@ -19,9 +19,10 @@ fn german() -> Language {
 }
 
 /// Panels of a hand with the mouse, of a script and of a replay.
-fn panels() -> [Panel; 3] {
-    let tools = vec![Tool::burr(3.0), Tool::perforator(), Tool::craniotome(), Tool::probe(2.0), Tool::spatula()];
-    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula"];
+fn panels() -> [Panel; 5] {
+    let soft = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator()];
+    let tools = [Tool::burr(3.0), Tool::perforator(), Tool::craniotome()].into_iter().chain(soft).collect();
+    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula", "aspirator"];
     let options = names.map(|name| (name.to_string(), None)).into();
     let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
     let by_hand = Panel { by_hand: true, rate_hz: 1000.0, choices: vec![choice], ..Panel::default() };
@@ -29,7 +30,10 @@ fn panels() -> [Panel; 3] {
     let marks = [mark].into();
     let timeline = Timeline { at_s: 2.0, length_s: 9.0, ready_s: 5.0, running: true, speed: 1.0, marks };
     let script = Panel { by_hand: false, ..by_hand.clone() };
-    [Panel { drilling: true, ..by_hand }, script.clone(), Panel { timeline: Some(timeline), ..script }]
+    let aspirates = |drilling| Panel { aspirates: true, drilling, ..by_hand.clone() };
+    let of_aspirator = [false, true].map(aspirates);
+    let [rests, runs] = of_aspirator;
+    [Panel { drilling: true, ..by_hand }, rests, runs, script.clone(), Panel { timeline: Some(timeline), ..script }]
 }
 
 #[test]

@@ -53,6 +53,6 @@ fn use_of(kind: ToolKind) -> &'static str {
         ToolKind::Craniotome => "Cuts bone with its side, from a burr hole; its foot protects the dura",
         ToolKind::Probe => "Presses the brain",
         ToolKind::Spatula => "Retracts the brain",
-        ToolKind::Aspirator => "Rests beside the burr",
+        ToolKind::Aspirator => "Takes brain tissue away while its pedal is down",
     }
 }

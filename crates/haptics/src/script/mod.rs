@@ -22,7 +22,7 @@
 mod operation;
 mod path;
 
-pub use operation::{Plan, Rim, Site};
+pub use operation::{Plan, Rim, Site, Target};
 pub use path::Waypoint;
 
 use crate::{Capabilities, HapticDevice, Reading, Status};
@@ -34,8 +34,10 @@ use trepan_geometry::{ToolState, Wrench};
 ///
 /// `aspirate` is for the second hand: its tool approaches beside the burr and rests on the bone.
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
-/// minute. `press` and `retract` hold the brain aside with the probe and with the spatula.
-pub const NAMES: [&str; 7] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract"];
+/// minute. `press` and `retract` hold the brain aside with the probe and with the spatula. `resect`
+/// opens a flap and takes a ball of tissue away with the aspirator, layer by layer.
+pub const NAMES: [&str; 8] =
+    ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract", "resect"];
 
 /// A script could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -251,6 +253,38 @@ mod tests {
         let taken: Vec<_> = all.iter().filter_map(|t| t.buttons.taken()).collect::<Vec<_>>();
         assert!(depth(&site, &all[lift]) < -30.0);
         assert_eq!((taken[0], taken[taken.len() - 1]), (ToolKind::Craniotome, ToolKind::Probe));
+    }
+
+    #[test]
+    fn a_resection_covers_its_target_through_a_keyhole_with_the_pedal_down() {
+        let site = site();
+        let target = Target { centre: site.entry + 16.0 * site.inward, radius_mm: 7.5, sinks_mm: 0.0 };
+        let plan = Plan { target: Some(target), ..Plan::default() };
+        let script = Script::planned("resect", &site, 120_000.0, &plan).unwrap();
+        let all: Vec<ToolState> = ticks(&script).collect();
+        let taken = all.iter().position(|t| t.buttons.taken() == Some(ToolKind::Aspirator)).unwrap();
+        let tips: Vec<&ToolState> = all[taken..].iter().filter(|t| t.buttons.has(Buttons::PEDAL)).collect();
+        let tip_mm = plan.aspirator_radius_mm;
+        let inside = |t: &&&ToolState| depth(&site, t) > 10.1;
+        for tool in tips.iter().filter(inside) {
+            assert!(
+                tool.tip().distance(target.centre) < target.radius_mm - tip_mm + 0.1,
+                "never beyond: {}",
+                tool.tip()
+            );
+            let shaft = tool.world_from_tool.rotation * Vec3::Z;
+            let way = (site.entry - tool.tip()).dot(-site.inward);
+            let crosses = tool.tip() + shaft * way / shaft.dot(-site.inward);
+            assert!(way < 12.0 || crosses.distance(site.entry) < 0.1, "through the keyhole: {crosses}");
+        }
+        let grid = (0..512).map(|n| Vec3::new((n % 8) as f32, (n / 8 % 8) as f32, (n / 64) as f32) * 2.0 - 7.0);
+        let places: Vec<Vec3> = grid.filter(|at| at.length() < target.radius_mm).map(|at| target.centre + at).collect();
+        let near = |at: &&Vec3| tips.iter().any(|t| t.tip().distance(**at) < tip_mm + 0.3);
+        let reached = places.iter().filter(near).count();
+        assert!(20 * reached > 19 * places.len(), "{reached} of {} places", places.len());
+        let (a, b) = (script.at(90_000.0), script.at(90_001.0));
+        let turn = (b.world_from_tool.rotation * a.world_from_tool.rotation.inverse()).to_scaled_axis();
+        assert!((turn - script.at(90_000.5).twist.angular).length() < 1e-4, "{turn}");
     }
 
     #[test]

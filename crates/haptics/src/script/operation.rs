@@ -59,6 +59,17 @@ pub struct Rim {
     pub bone_mm: f32,
 }
 
+/// A ball of tissue to resect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Its centre, world mm.
+    pub centre: Vec3,
+    /// Its radius, mm.
+    pub radius_mm: f32,
+    /// How far it sinks along the way in once the dura is open, mm.
+    pub sinks_mm: f32,
+}
+
 /// Tool sizes and path lengths of an operation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -93,8 +104,12 @@ pub struct Plan {
     pub outline: Vec<Rim>,
     /// Depth of the centre of the craniotome's foot below the bone, mm.
     pub foot_mm: f32,
-    /// Whether a flap's operation goes on to press the brain.
+    /// Whether the bone is open from the start.
+    pub is_open: bool,
+    /// Whether a flap's operation goes on to the brain.
     pub presses_after_flap: bool,
+    /// What is resected; `None` for a small ball of brain below the entry.
+    pub target: Option<Target>,
 }
 
 impl Default for Plan {
@@ -114,7 +129,9 @@ impl Default for Plan {
             retract_mm: [3.0, 4.0],
             outline: Vec::new(),
             foot_mm: 0.8,
+            is_open: false,
             presses_after_flap: true,
+            target: None,
         }
     }
 }
@@ -159,6 +176,11 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
             let (start, moves) = flap(site, plan);
             (start, upright, moves)
         }
+        "resect" => {
+            let (start, moves) = opened(site, plan);
+            let resection = resect(site, plan).into_iter().filter(|_| plan.presses_after_flap);
+            (start, upright, moves.into_iter().chain(resection).collect())
+        }
         "craniotomy" => (start, upright, craniotomy(site, plan)),
         "probe" => (start, upright, probe(site, plan)),
         "press" => (start, upright, press(site, plan)),
@@ -171,6 +193,9 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
     let whole: f64 = moves.iter().map(|m| m.1).sum();
     let mut path = Path::from(start, rotation);
     for Move(label, share, tip, buttons) in moves {
+        if buttons.taken() == Some(ToolKind::Aspirator) {
+            path.through(site.entry);
+        }
         path.to(label, duration_ms * share / whole, tip, buttons);
     }
     path.end_at(duration_ms);
@@ -247,6 +272,64 @@ fn flap(site: &Site, plan: &Plan) -> (Vec3, Vec<Move>) {
     let brain = [change(site, plan), probe(site, plan)].into_iter().flatten().filter(|_| plan.presses_after_flap);
     moves.extend(brain.map(|m| Move(m.0, 0.8 * m.1, m.2, m.3)));
     (hole.below(-plan.start_mm), moves)
+}
+
+/// Opens the bone by the planned flap or a burr hole; nothing where it is open.
+fn opened(site: &Site, plan: &Plan) -> (Vec3, Vec<Move>) {
+    match (plan.is_open, plan.outline.is_empty()) {
+        (true, _) => (site.below(-plan.start_mm), Vec::new()),
+        (_, true) => (site.below(-plan.start_mm), craniotomy(site, plan)),
+        _ => flap(site, &Plan { presses_after_flap: false, ..plan.clone() }),
+    }
+}
+
+/// Share of the time for a millimetre of the aspirator's way, numerical; a flap takes 110.
+const ASPIRATING_SHARE: f64 = 0.5;
+/// Distance between layers and between the circles of a layer, mm: less than the tip is wide.
+const LAYER_MM: f32 = 1.5;
+/// Corners of a circle.
+const CORNERS: u8 = 12;
+
+/// Takes the target away with the aspirator, layer by layer from above, each from the middle. The
+/// target may lie anywhere between its place at rest and where it sinks to.
+fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
+    let tip_mm = plan.aspirator_radius_mm;
+    let usual = Target { centre: site.below(site.brain_mm + 2.0), radius_mm: 5.0, sinks_mm: 0.0 };
+    let Target { centre, radius_mm, sinks_mm } = plan.target.unwrap_or(usual);
+    let turn = Quat::from_rotation_arc(Vec3::NEG_Z, site.inward.normalize());
+    let reach_mm = (radius_mm - tip_mm).max(0.0);
+    let top = centre - site.inward * ((centre - site.entry).dot(site.inward) - site.brain_mm + tip_mm + 1.0);
+    let away = site.below(-plan.away_mm);
+    let mut moves = vec![
+        Move("take the aspirator", 1.5, away, Buttons::take(ToolKind::Aspirator)),
+        Move("come to the brain", 6.0, top, HANDS_OFF),
+    ];
+    let mut aspirate = |tip: Vec3, mm: f32| {
+        moves.push(Move("aspirate", ASPIRATING_SHARE * f64::from(mm.max(0.2)), tip, Buttons::PEDAL));
+    };
+    let mut last = top;
+    let long_mm = 2.0 * reach_mm + sinks_mm;
+    let layers = (long_mm / LAYER_MM).ceil().max(1.0) as u8;
+    for layer in 0..=layers {
+        let below_mm = long_mm * f32::from(layer) / f32::from(layers) - reach_mm;
+        let from_middle_mm = below_mm.min(0.0) + (below_mm - sinks_mm).max(0.0);
+        let wide_mm = (reach_mm * reach_mm - from_middle_mm * from_middle_mm).max(0.0).sqrt();
+        let middle = centre + below_mm * site.inward;
+        let circles = (wide_mm / LAYER_MM).ceil() as u8;
+        let corners = (1..=circles).flat_map(|circle| {
+            let radius_mm = wide_mm * f32::from(circle) / f32::from(circles);
+            (0..=CORNERS).map(move |corner| {
+                let (sin, cos) = (f32::from(corner) / f32::from(CORNERS) * std::f32::consts::TAU).sin_cos();
+                middle + turn * (radius_mm * Vec3::new(cos, sin, 0.0))
+            })
+        });
+        for tip in [middle].into_iter().chain(corners) {
+            aspirate(tip, tip.distance(last));
+            last = tip;
+        }
+    }
+    moves.extend([Move("draw back", 4.0, top, HANDS_OFF), Move("leave", 4.0, away, HANDS_OFF)]);
+    moves
 }
 
 /// A circular outline on flat bone.

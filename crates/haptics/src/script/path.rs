@@ -1,4 +1,4 @@
-//! Minimum-jerk motion through waypoints.
+//! Minimum-jerk motion through waypoints, upright or through a keyhole.
 
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
 
@@ -15,19 +15,41 @@ pub struct Waypoint {
     pub buttons: Buttons,
 }
 
-/// A path through waypoints in one orientation. It has at least one waypoint, and times never
-/// decrease.
+/// Least depth below a keyhole at which the shaft is aimed at it, mm; above, it turns upright.
+const LEVER_MM: f32 = 12.0;
+/// Time over which an angular velocity is taken, ms.
+const TURN_MS: f64 = 1.0;
+
+/// A path through waypoints in one orientation, or with the shaft through a keyhole. It has at
+/// least one waypoint, and times never decrease.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
     waypoints: Vec<Waypoint>,
     rotation: Quat,
+    /// The keyhole, and from when on the shaft goes through it, ms.
+    keyhole: Option<(Vec3, f64)>,
 }
 
 impl Path {
     /// Starts a path at `start`; continue with [`Path::to`].
     pub(super) fn from(start: Vec3, rotation: Quat) -> Self {
         let first = Waypoint { label: "wait", time_ms: 0.0, tip: start, buttons: Buttons::default() };
-        Self { waypoints: vec![first], rotation }
+        Self { waypoints: vec![first], rotation, keyhole: None }
+    }
+
+    /// From now on, aims the shaft at a point from below it; far above, it is upright.
+    pub(super) fn through(&mut self, keyhole: Vec3) {
+        self.keyhole = Some((keyhole, self.end_ms()));
+    }
+
+    /// The tool's rotation with its tip at a place.
+    fn rotation_at(&self, tip: Vec3, time_ms: f64) -> Quat {
+        let Some((keyhole, _)) = self.keyhole.filter(|(_, from_ms)| time_ms >= *from_ms) else { return self.rotation };
+        let outward = self.rotation * Vec3::Z;
+        let (way, aside) = ((keyhole - tip).dot(outward), (keyhole - tip).reject_from(outward));
+        let share = ((way + LEVER_MM) / LEVER_MM).clamp(0.0, 1.0);
+        let aim = outward + share * aside / way.max(LEVER_MM);
+        Quat::from_rotation_arc(outward, aim.normalize()) * self.rotation
     }
 
     /// Appends a move to `tip` in `duration_ms`.
@@ -52,21 +74,30 @@ impl Path {
 
     /// The tool at a time; NaN counts as the start.
     pub(super) fn at(&self, time_ms: f64) -> ToolState {
+        let (tip, linear, buttons) = self.tip_at(time_ms);
+        let rotation = self.rotation_at(tip, time_ms);
+        let angular = match self.keyhole {
+            Some(_) => {
+                let [before, after] = [-0.5, 0.5].map(|share| self.tip_at(time_ms + share * TURN_MS).0);
+                let turn = self.rotation_at(after, time_ms) * self.rotation_at(before, time_ms).inverse();
+                turn.to_scaled_axis() / TURN_MS as f32
+            }
+            None => Vec3::ZERO,
+        };
+        let world_from_tool = Pose::from_parts(tip, rotation);
+        ToolState { world_from_tool, twist: Twist { linear, angular }, buttons, time_ms }
+    }
+
+    /// Tip, its velocity, mm/ms, and the buttons at a time.
+    fn tip_at(&self, time_ms: f64) -> (Vec3, Vec3, Buttons) {
         let after = self.waypoints.partition_point(|waypoint| waypoint.time_ms < time_ms);
-        let (tip, linear, buttons) = match (after.checked_sub(1).map(|i| &self.waypoints[i]), self.waypoints.get(after))
-        {
+        match (after.checked_sub(1).map(|i| &self.waypoints[i]), self.waypoints.get(after)) {
             (Some(from), Some(to)) => {
                 let (tip, linear) = minimum_jerk(from, to, time_ms);
                 (tip, linear, to.buttons)
             }
             (None, Some(first)) => (first.tip, Vec3::ZERO, first.buttons),
             (_, None) => (self.waypoints[self.waypoints.len() - 1].tip, Vec3::ZERO, Buttons::default()),
-        };
-        ToolState {
-            world_from_tool: Pose::from_parts(tip, self.rotation),
-            twist: Twist { linear, angular: Vec3::ZERO },
-            buttons,
-            time_ms,
         }
     }
 }

@@ -64,6 +64,8 @@ pub struct SceneRecord {
     pub cuts: Vec<SceneChange>,
     /// Displacement of each node of the brain from rest, [`NODE_STEP_MM`]; in some records.
     pub nodes: Option<Vec<[i16; 3]>>,
+    /// Tetrahedra of the brain that were resected.
+    pub gone: Vec<u32>,
 }
 
 /// Writes the scene of a session.
@@ -97,7 +99,7 @@ impl SceneWriter {
                 [voxels, cuts].map(|all| all.split_at(all.len().min(MOST_CHANGES)));
             let is_last = more_voxels.is_empty() && more_cuts.is_empty();
             self.bytes.clear();
-            encode(record, [some, others], record.nodes.as_deref().filter(|_| is_last), &mut self.bytes);
+            encode(record, [some, others], is_last, &mut self.bytes);
             let time_ns = (record.time_ms.max(0.0) * 1e6) as u64;
             let header =
                 MessageHeader { channel_id: self.channel, sequence: 0, log_time: time_ns, publish_time: time_ns };
@@ -155,7 +157,9 @@ pub fn read_scene(path: &Path, of: &SessionHeader) -> Result<Option<Vec<SceneRec
     Ok(reading.header.filter(|(_, header)| header == of).map(|_| records))
 }
 
-fn encode(record: &SceneRecord, changes: [&[SceneChange]; 2], nodes: Option<&[[i16; 3]]>, out: &mut Vec<u8>) {
+fn encode(record: &SceneRecord, changes: [&[SceneChange]; 2], with_brain: bool, out: &mut Vec<u8>) {
+    let nodes = record.nodes.as_deref().filter(|_| with_brain);
+    let gone = if with_brain { &record.gone[..] } else { &[] };
     out.extend(record.tick.to_le_bytes());
     out.extend(record.time_ms.to_le_bytes());
     out.extend(record.warnings.to_le_bytes());
@@ -172,6 +176,7 @@ fn encode(record: &SceneRecord, changes: [&[SceneChange]; 2], nodes: Option<&[[i
     out.extend(nodes.map_or(u32::MAX, |nodes| nodes.len() as u32).to_le_bytes());
     let nodes = nodes.unwrap_or_default();
     (0..3).for_each(|axis| nodes.iter().for_each(|node| out.extend(node[axis].to_le_bytes())));
+    gone.iter().for_each(|tet| out.extend(tet.to_le_bytes()));
 }
 
 fn decode(bytes: &[u8]) -> Option<SceneRecord> {
@@ -188,17 +193,12 @@ fn decode(bytes: &[u8]) -> Option<SceneRecord> {
             Some(x.zip(y).zip(z).map(|((x, y), z)| [x, y, z].map(u16::cast_signed)).collect())
         }
     };
-    rest.0.is_empty().then_some(SceneRecord {
-        tick,
-        time_ms,
-        warnings,
-        open,
-        removed_mm3,
-        spindle,
-        voxels,
-        cuts,
-        nodes,
-    })
+    // Records of files without resection end here.
+    let mut gone = Vec::new();
+    while !rest.0.is_empty() {
+        gone.push(rest.u32()?);
+    }
+    Some(SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes, gone })
 }
 
 fn changes(rest: &mut Cursor<'_>) -> Option<Vec<SceneChange>> {
@@ -231,6 +231,7 @@ mod tests {
             voxels: (0..n).map(change).collect(),
             cuts: (0..3 * n).map(change).collect(),
             nodes: n.is_multiple_of(3).then(|| vec![[n as i16, -3, 9]; 40]),
+            gone: (0..n as u32 % 4).collect(),
         };
         (0..200).map(of).collect()
     }
@@ -265,12 +266,13 @@ mod tests {
         let path = folder.path().join("a.scene");
         let header = SessionHeader::default();
         let voxels = vec![SceneChange { at: [1, 2, 3], before: 900, after: -1000 }; 2 * MOST_CHANGES + 5];
-        let record = SceneRecord { voxels, nodes: Some(vec![[1; 3]]), ..SceneRecord::default() };
+        let record = SceneRecord { voxels, nodes: Some(vec![[1; 3]]), gone: vec![9], ..SceneRecord::default() };
         let mut writer = SceneWriter::create(&path, &header).unwrap();
         writer.write(&record).unwrap();
         writer.finish().unwrap();
         let read = read_scene(&path, &header).unwrap().unwrap();
         assert_eq!(read.iter().map(|record| record.voxels.len()).sum::<usize>(), record.voxels.len());
         assert!(read.len() == 3 && read[2].nodes.is_some() && read[0].nodes.is_none());
+        assert!(read[2].gone == [9] && read[0].gone.is_empty());
     }
 }

@@ -151,7 +151,7 @@ impl Opening {
 
     /// Finds a place to probe a brain without a skull.
     pub fn on_bare_brain(brain: &Inside) -> Option<Self> {
-        bare_brain(&brain.field, brain.middle).map(Self::from)
+        bare_brain(&brain.field, brain.middle, None).map(Self::from)
     }
 
     /// Point on the brain's surface below the entry.
@@ -173,7 +173,7 @@ impl From<Opening> for Site {
 }
 
 /// Centre of the bounding box of the nonzero voxels.
-fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
+pub(crate) fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
     let [nx, ny, _] = classes.dims;
     let place = |at: usize| classes.centre_of([at % nx, at / nx % ny, at / (nx * ny)]).as_vec3();
     let filled = (0..classes.data.len()).filter(|at| classes.data[*at] != 0).map(place).map(|p| [p, p]);
@@ -181,10 +181,19 @@ fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
     within.map_or(Vec3::ZERO, |[low, high]| 0.5 * (low + high))
 }
 
-/// Finds a place to probe a brain without a skull, on a ray to its centre from above, right and
-/// front.
-pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
-    let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
+/// A point outside the skull, RAS mm, over a tumour, as seen from the middle of the head.
+pub(crate) fn over([x, y, z, _]: [f32; 4], middle: Vec3) -> [f32; 3] {
+    (middle + OVER_MM * (Vec3::new(x, y, z) - middle).normalize_or(Vec3::Z)).into()
+}
+
+/// Distance of that point from the middle of the head, mm: outside of every skull.
+const OVER_MM: f32 = 150.0;
+
+/// Finds a place to probe a brain without a skull, on a ray to its centre. The ray comes from
+/// outside a tumour or, without one, from above, right and front.
+pub fn bare_brain(brain: &DistanceField, centre: Vec3, tumour: Option<Vec3>) -> Option<Site> {
+    let usual = Vec3::new(0.45, 0.35, 0.82).normalize();
+    let outward = tumour.map_or(usual, |tumour| (tumour - centre).normalize_or(usual));
     let from = centre + search::FAR_MM * outward;
     let depth = search::first(0.0, search::FAR_MM, |t| -brain.sample(from - t * outward))?;
     Some(Site { entry: from - depth * outward, inward: -outward, bone_mm: 0.0, brain_mm: 0.0 })

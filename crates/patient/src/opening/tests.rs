@@ -108,7 +108,7 @@ fn bone_lost_on_a_coarse_grid_is_an_error() {
 #[test]
 fn a_brain_without_skull_is_touched_at_its_surface() {
     let (_, mask) = head(|r, _| wall(r, 6.0));
-    let site = bare_brain(&DistanceField::of_mask(&mask), Vec3::ZERO).unwrap();
+    let site = bare_brain(&DistanceField::of_mask(&mask), Vec3::ZERO, None).unwrap();
     assert!((site.entry.length() - 78.0).abs() < 1.5, "{site:?}");
 }
 

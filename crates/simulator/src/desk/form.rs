@@ -30,8 +30,11 @@ pub(crate) struct Form {
 }
 
 /// A demonstration by script: its name, what it shows.
-const DEMONSTRATIONS: [(&str, &str); 2] =
-    [("", "the whole operation, by itself"), ("flap", "a bone flap is cut, by itself")];
+const DEMONSTRATIONS: [(&str, &str); 3] = [
+    ("", "the whole operation, by itself"),
+    ("flap", "a bone flap is cut, by itself"),
+    ("resect", "tissue is aspirated, by itself"),
+];
 
 impl Form {
     /// Reads the settings; the newest recent case is chosen, else the built-in one.
@@ -48,7 +51,11 @@ impl Form {
     pub fn devices(&self, program: Program) -> Vec<(String, Choosable)> {
         let choosable = |name: &str, hint: &str, open| Choosable { name: name.into(), hint: hint.into(), open };
         let mouse = ("mouse".to_string(), choosable("mouse", "the mouse moves the tool; walls are not felt", true));
-        let demonstrations = DEMONSTRATIONS.iter().filter(|(name, _)| program.has_bone() || name.is_empty());
+        let demonstrations = DEMONSTRATIONS.iter().filter(|(name, _)| match *name {
+            "flap" => program.has_bone(),
+            "resect" => program.has_tissue(),
+            _ => true,
+        });
         let shown = demonstrations.map(|(name, hint)| {
             let script = if name.is_empty() { program.script() } else { name };
             (format!("script:{script}"), choosable(&format!("demonstration: {script}"), hint, true))

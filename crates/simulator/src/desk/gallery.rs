@@ -50,7 +50,7 @@ impl Gallery {
         let case = trepan_fixtures::case_head();
         let tissues = TissueSource::regions_of_aseg(case.aseg);
         let (ct, mri, labels) = (Some(case.ct), Some(case.mri), Some(case.labels));
-        let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues };
+        let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues, ..Inputs::default() };
         let language = std::env::var("TREPAN_GALLERY_LANGUAGE").unwrap_or("en".into());
         let options = Options::try_parse_from(["x", "--quality", "draft", "--language", &language]).unwrap();
         let (stage, offers) = window::stage();
@@ -260,8 +260,8 @@ fn panel_texts() -> Vec<String> {
     let whats = whats.into_iter().chain(hindrances).chain(tools);
     let whats = whats.chain(force.map(|[waits, second]| What::Force { waits, second }));
     let notices = whats.map(|what| Notice { tick: 0, time_ms: 0.0, what }.words().1);
-    let phases = [Phase::Craniotomy, Phase::Brain];
-    let hints = phases.into_iter().flat_map(|phase| [true, false].map(|hand| notice_text::hint(phase, hand).into()));
+    let tray = Program::Integrated.tray().iter();
+    let hints = tray.flat_map(|tool| [true, false].map(|hand| notice_text::hint(tool, hand).into()));
     let lessons = Lesson::all(None).into_iter().flat_map(|lesson| {
         let steps = lesson.steps.into_iter().map(|step| step.text);
         steps.chain(lesson.marks.into_iter().map(|mark| mark.text)).chain([lesson.title, lesson.about])

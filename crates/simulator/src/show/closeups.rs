@@ -22,16 +22,20 @@ const MOST_FAULTS: usize = 4;
 const GRAVE: [&str; 4] = ["brain-touched", "brain-pressed", "forbidden-near", "break-through"];
 
 impl SessionSetup {
-    /// Draws the opening and the tool at the first warning of each kind, the gravest kinds.
+    /// Draws the opening and the tool at the first warning of each kind, the gravest kinds, without
+    /// the tetrahedra of which nothing is left.
     pub fn close_pictures(
         &self,
         painter: &mut Painter,
         recording: &Recording,
+        fills: &[u16],
         folder: &Path,
     ) -> Vec<Result<Shot, SessionError>> {
         let shown = self.program.has_bone();
+        let gone: Vec<bool> = fills.iter().map(|fill| *fill == 0).collect();
         let plain = |camera: Camera| Frame {
             show_bone: shown,
+            brain_gone: Some(&gone[..]).filter(|gone| !gone.is_empty()),
             slices: SliceLook { shown: false, ..SliceLook::default() },
             ..Frame::of(camera)
         };

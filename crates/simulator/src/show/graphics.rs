@@ -41,14 +41,8 @@ pub(crate) struct Graphics {
 
 impl Graphics {
     /// Opens a painter for pictures of `size` pixels. The CPU painter replaces a software driver,
-    /// which takes six times as long for a picture: in a window, and headless where the models
-    /// leave out rays or pixels.
-    pub fn open(
-        setup: &SessionSetup,
-        size: [u32; 2],
-        device: Result<Gpu, GpuError>,
-        windowed: bool,
-    ) -> Result<Self, RenderError> {
+    /// which takes six times as long for a picture.
+    pub fn open(setup: &SessionSetup, size: [u32; 2], device: Result<Gpu, GpuError>) -> Result<Self, RenderError> {
         let Picture { sparse, detail } = setup.models.setup.picture;
         let brain = setup.scene.brain.as_ref();
         let data = SceneData {
@@ -57,7 +51,7 @@ impl Graphics {
             mri: brain.map(|brain| &brain.mri),
             tint: brain.and_then(|brain| brain.tint.as_deref()),
         };
-        let by_processor = (windowed || sparse || detail < 1.0) && device.as_ref().is_ok_and(Gpu::is_software);
+        let by_processor = device.as_ref().is_ok_and(Gpu::is_software);
         let painter = if by_processor { Painter::by_processor(&data, size) } else { Painter::on(device, &data, size) };
         let mut painter = painter?;
         painter.set_quality(sparse, detail as f32)?;

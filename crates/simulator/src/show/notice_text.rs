@@ -1,6 +1,6 @@
 //! Texts of the window's panel, live and in a replay: phase, tool, forces, warnings.
 
-use trepan_geometry::{Buttons, Tool};
+use trepan_geometry::{Buttons, Tool, ToolKind};
 use trepan_report::printable::capital;
 use trepan_report::uncertainty::Band;
 use trepan_runtime::View;
@@ -29,6 +29,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
+    let aspirates = sample.tool.kind == ToolKind::Aspirator;
     let brain_mm = match view.brain_distance_mm {
         mm if mm.is_finite() => format!("{mm:.1} mm"),
         _ => "no brain here".into(),
@@ -55,7 +56,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         case: case.into(),
         phase: ["Craniotomy", "Brain"][sample.phase() as usize].into(),
         tool: called(&sample.tool),
-        drilling: sample.drilling,
+        drilling: sample.drilling || aspirates && sample.state.buttons.has(Buttons::PEDAL),
+        aspirates,
         sound: Sound {
             spindle: view.spindle,
             load: view.force.length() / view.force_limit_n.max(1e-3),
@@ -67,7 +69,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         values: values.into_iter().chain(band).chain(second).collect(),
         task,
         no_bone: !program.has_bone(),
-        no_drill: (!sample.tool.kind.cuts())
+        no_drill: (!sample.tool.kind.cuts() && !aspirates)
             .then(|| format!("the {} does not drill: take a tool for bone with its number key", called(&sample.tool))),
         warnings: urgent(view.warnings).map(|warning| warning.text().into()).collect(),
         technical: technical(view.warnings).map(|warning| warning.text().into()).collect(),
@@ -113,11 +115,14 @@ fn in_words(notice: Notice) -> String {
 }
 
 /// Returns a hint on what to do next.
-pub(crate) fn hint(phase: Phase, by_hand: bool) -> &'static str {
-    match (phase, by_hand) {
+pub(crate) fn hint(tool: &Tool, by_hand: bool) -> &'static str {
+    match (Phase::of(tool), by_hand) {
         (_, false) => "the operation runs by itself",
         (Phase::Craniotomy, true) => {
             "point at the skull, hold the left button to drill there; let go to draw back; U undoes the last stroke"
+        }
+        (Phase::Brain, true) if tool.kind == ToolKind::Aspirator => {
+            "point at the brain and hold the left button to take tissue away there; it does not come back"
         }
         (Phase::Brain, true) => "point at the brain and hold the left button to press it; let go to draw back",
     }
@@ -182,7 +187,7 @@ mod tests {
             let panel = panel("c", Program::Integrated, &View { bone_open, ..view(0) });
             panel.choices[0].options.iter().filter(|(_, why_not)| why_not.is_some()).count()
         };
-        assert_eq!((closed(false), closed(true)), (2, 0), "probe and spatula");
+        assert_eq!((closed(false), closed(true)), (3, 0), "probe, spatula and aspirator");
     }
 
     #[test]

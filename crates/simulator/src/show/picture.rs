@@ -15,6 +15,7 @@ use trepan_report::summary::MovingSummary;
 use trepan_runtime::clock::Clock;
 use trepan_runtime::stop::Stop;
 use trepan_runtime::{RenderInputs, Times, View};
+use trepan_stages::collision_step::SoftFrame;
 use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;
 
@@ -81,6 +82,26 @@ impl Album {
     }
 }
 
+/// The brain as a picture shows it.
+#[derive(Default)]
+pub(crate) struct Shape {
+    /// Its nodes, mm; empty while it is at rest.
+    pub positions: Vec<Vec3>,
+    /// What is left of its tetrahedra, of 65535, and which are gone; empty where none can go.
+    pub fills: Vec<u16>,
+    pub gone: Vec<bool>,
+}
+
+impl Shape {
+    /// Takes what the solver published.
+    pub fn take(&mut self, soft: &SoftFrame) {
+        self.positions.clone_from(&soft.positions);
+        self.fills.clone_from(&soft.fills);
+        self.gone.clear();
+        self.gone.extend(soft.fills.iter().map(|fill| *fill == 0));
+    }
+}
+
 /// Returns the default camera on the site.
 pub(crate) fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, eye(site), 170.0)
@@ -110,7 +131,7 @@ pub(crate) fn microscope(site: &Site) -> Camera {
 pub(crate) fn frame<'a>(
     camera: Camera,
     view: &View,
-    brain_positions: Option<&'a [Vec3]>,
+    brain: &'a Shape,
     bone_shown: bool,
     colours: &'a Colours,
 ) -> Frame<'a> {
@@ -123,7 +144,8 @@ pub(crate) fn frame<'a>(
         turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },
         drilling: view.sample.drilling,
         overlay: Overlay { force: arrow(view), ..Overlay::default() },
-        brain_positions,
+        brain_positions: Some(&brain.positions[..]).filter(|positions| !positions.is_empty()),
+        brain_gone: Some(&brain.gone[..]).filter(|gone| !gone.is_empty()),
         show_bone: bone_shown,
         slices: SliceLook { half_height_mm: Some(SLICE_MM), ..SliceLook::default() },
         ..Frame::of(camera)
@@ -156,15 +178,15 @@ pub(crate) fn draw(
     let mut candidates: Vec<(f64, PathBuf)> = Vec::new();
     let clock = Clock::start();
     let (camera, colours, bone_shown) = (camera(&setup.scene.site), setup.colours(), setup.program.has_bone());
-    let mut next_ms = 0.0;
+    let (mut next_ms, mut brain) = (0.0, Shape::default());
     loop {
         let view = *inputs.view.latest().0;
         let over = view.finished || stop.asked();
         if over || clock.now_ms() >= next_ms {
             next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
-            let soft = inputs.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
+            inputs.soft.iter_mut().for_each(|soft| brain.take(soft.latest().0));
             let path = folder.join(format!("frame-{:05}.png", album.frames));
-            let drawn = painter.picture(&frame(camera, &view, soft, bone_shown, &colours));
+            let drawn = painter.picture(&frame(camera, &view, &brain, bone_shown, &colours));
             match drawn.map_err(SessionError::from).and_then(|(image, _)| write(&image, &path)) {
                 Ok(()) => {
                     album.frames += 1;

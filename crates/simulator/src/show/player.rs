@@ -5,10 +5,11 @@
 //! brain are the session's film ([`trepan_runtime::film`]), read from its file or made while it is
 //! shown; then the window says how far it is. Seeking writes the voxels and nodes that changed
 //! in between, some 20 ns each, at most [`MAX_VOXELS`] per picture: a longer jump takes more.
-//! The brain's nodes are interpolated between the shots that hold them.
+//! The brain's nodes are interpolated between the shots that hold them; resected tetrahedra come
+//! back.
 
 use crate::show::notice_text::NEWS_MS;
-use crate::show::picture::Album;
+use crate::show::picture::{Album, Shape};
 use crate::show::window::{self, SessionView, ViewState};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -43,9 +44,9 @@ struct Film {
     bone: Option<Arc<BoneVolume>>,
     /// Index of the present shot.
     at: usize,
-    /// Positions of the brain's nodes at rest and now, mm.
+    /// Positions of the brain's nodes at rest, mm.
     rest: Vec<Vec3>,
-    positions: Vec<Vec3>,
+    brain: Shape,
 }
 
 impl Film {
@@ -78,10 +79,15 @@ impl Film {
         self.place_brain();
     }
 
-    /// Writes the changes of a shot into the skull; returns their number.
-    fn write(&self, shot: usize, forwards: bool) -> usize {
-        let (Some(bone), Some(shot)) = (&self.bone, self.shots.get(shot)) else { return 0 };
-        shot.write(bone, forwards)
+    /// Writes the changes of a shot into skull and brain; returns their number in the skull.
+    fn write(&mut self, shot: usize, forwards: bool) -> usize {
+        let Some(shot) = self.shots.get(shot) else { return 0 };
+        for tet in shot.gone.iter().map(|tet| *tet as usize) {
+            self.brain.gone.resize(self.brain.gone.len().max(tet + 1), false);
+            self.brain.fills.resize(self.brain.gone.len(), u16::MAX);
+            (self.brain.gone[tet], self.brain.fills[tet]) = (forwards, if forwards { 0 } else { u16::MAX });
+        }
+        self.bone.as_ref().map_or(0, |bone| shot.write(bone, forwards))
     }
 
     /// Interpolates the brain's nodes between the nearest shots that hold them.
@@ -101,8 +107,8 @@ impl Film {
         let node = |(rest, (from, to)): (&Vec3, (&[i16; 3], &[i16; 3]))| {
             position(*rest, *from).lerp(position(*rest, *to), share)
         };
-        self.positions.clear();
-        self.positions.extend(self.rest.iter().zip(from.iter().zip(to)).map(node));
+        self.brain.positions.clear();
+        self.brain.positions.extend(self.rest.iter().zip(from.iter().zip(to)).map(node));
     }
 }
 
@@ -141,7 +147,7 @@ pub(crate) fn show(
         shown: ViewState::of(opened, bone.is_some(), stop),
         hint: recording.losses().map_or_else(|| HINT.into(), |losses| format!("not a whole recording: {losses}")),
         until_s,
-        film: Film { shots: Vec::new(), coming, bone, at: 0, rest, positions: Vec::new() },
+        film: Film { shots: Vec::new(), coming, bone, at: 0, rest, brain: Shape::default() },
     };
     let (player, album) = window::run(player, painter, opened, first);
     player.shown.finish(album)
@@ -189,14 +195,14 @@ impl Session for Player {
         let passed_s = input.seconds - self.now_s.replace(input.seconds).unwrap_or(input.seconds);
         advance(&mut self.timeline, input.playback, passed_s);
         self.film.go_to(self.timeline.at_s * 1e3);
-        let mut panel = self.shown.panel(&self.view(), false);
+        let mut panel = self.shown.panel(&self.view(), &self.film.brain, false);
         panel.news.extend(self.news());
         let finished = self.shown.stop.asked() || input.seconds > self.until_s;
         Panel { hint: self.hint.clone(), timeline: Some(self.timeline.clone()), finished, ..panel }
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
-        self.shown.frame(camera, &self.view(), &self.film.positions)
+        self.shown.frame(camera, &self.view(), &self.film.brain)
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {
@@ -262,9 +268,10 @@ mod tests {
             let at = [n % 40, n / 40, 1].map(|n| n as u16);
             let voxels = vec![SceneChange { at, before: 900, after: -1000 }];
             let nodes = (n % 2 == 0).then(|| displacements(&[Vec3::X * 0.25 * n as f32], &[Vec3::ZERO]));
-            sender.send(Shot { view: view(10.0 * n as f64), voxels, cuts: Vec::new(), nodes }).unwrap();
+            let gone = vec![n as u32];
+            sender.send(Shot { view: view(10.0 * n as f64), voxels, cuts: Vec::new(), nodes, gone }).unwrap();
         }
-        let mut film = Film { shots: Vec::new(), coming, bone, at: 0, rest: vec![Vec3::ZERO], positions: Vec::new() };
+        let mut film = Film { shots: Vec::new(), coming, bone, at: 0, rest: vec![Vec3::ZERO], brain: Shape::default() };
         film.grow();
         film.write(0, true);
         film
@@ -278,10 +285,15 @@ mod tests {
         for (time_ms, shot) in [(995.0, 99), (0.0, 0), (1990.0, 199), (501.0, 50), (500.0, 50), (-5.0, 0), (1e9, 199)] {
             film.go_to(time_ms);
             assert_eq!((film.at, gone()), (shot, shot + 1), "at {time_ms} ms");
-            assert!((4.0 * film.positions[0].x - shot as f32).abs() < 1.0 + 1e-3, "{}", film.positions[0].x);
+            assert_eq!(film.brain.gone.iter().filter(|gone| **gone).count(), shot + 1, "resected, at {time_ms} ms");
+            assert!(
+                (4.0 * film.brain.positions[0].x - shot as f32).abs() < 1.0 + 1e-3,
+                "{}",
+                film.brain.positions[0].x
+            );
         }
         film.go_to(510.0);
-        assert_eq!(4.0 * film.positions[0].x, 51.0, "between the brains of shots 50 and 52");
+        assert_eq!(4.0 * film.brain.positions[0].x, 51.0, "between the brains of shots 50 and 52");
     }
 
     #[test]

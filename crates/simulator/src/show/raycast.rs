@@ -6,10 +6,11 @@
 //! for the short rays below it.
 
 use crate::session_setup::SessionSetup;
+use crate::show::picture::Shape;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Vec3};
-use trepan_mesh::Surface;
+use trepan_mesh::{Surface, TetMesh};
 use trepan_runtime::View;
 use trepan_stages::ahead::{bone_ahead_mm, density};
 use trepan_stages::program::Phase;
@@ -27,8 +28,10 @@ pub(crate) struct Raycast {
     triangles: Vec<[u32; 3]>,
     /// Longest edge of a triangle at rest, mm.
     edge_mm: f32,
-    /// Nodes of the brain at rest, mm.
-    rest: Vec<Vec3>,
+    /// The brain at rest.
+    rest: TetMesh,
+    /// Which of its tetrahedra the triangles leave out.
+    gone: Vec<bool>,
     /// The triangles around the tool, mm.
     near: Vec<[Vec3; 3]>,
 }
@@ -38,25 +41,37 @@ impl Raycast {
     pub fn of(setup: &SessionSetup) -> Self {
         let bone = setup.scene.bone.clone().filter(|_| setup.program.has_bone());
         let Some(brain) = &setup.scene.brain else { return Self { bone, ..Self::default() } };
-        let rest: Vec<Vec3> = brain.mesh.positions.clone();
-        let triangles = Surface::of(&brain.mesh).triangles;
-        let edge = |[a, b, _]: &[u32; 3]| rest[*a as usize].distance(rest[*b as usize]);
-        let edge_mm = triangles.iter().map(edge).fold(0.0, f32::max);
-        Self { bone, triangles, edge_mm, rest, near: Vec::new() }
+        let mut made = Self { bone, rest: brain.mesh.clone(), ..Self::default() };
+        made.cover(&[]);
+        made
     }
 
-    /// Takes the brain's present nodes (empty: at rest) around the tool's tip.
-    pub fn follow(&mut self, positions: &[Vec3], tip: Vec3) {
-        let at = if positions.is_empty() { &self.rest[..] } else { positions };
+    /// Takes the border of what is left of the brain.
+    fn cover(&mut self, gone: &[bool]) {
+        let at = &self.rest.positions;
+        let is_left = |(tet, _): &(usize, &[u32; 4])| !gone.get(*tet).is_some_and(|gone| *gone);
+        let tets = self.rest.tets.iter().enumerate().filter(is_left).map(|(_, tet)| *tet).collect();
+        self.triangles = Surface::of(&TetMesh { positions: at.clone(), tets }).triangles;
+        let edge = |[a, b, _]: &[u32; 3]| at[*a as usize].distance(at[*b as usize]);
+        self.edge_mm = self.triangles.iter().map(edge).fold(0.0, f32::max);
+        self.gone = gone.to_vec();
+    }
+
+    /// Takes the brain as it lies around the tool's tip.
+    pub fn follow(&mut self, brain: &Shape, tip: Vec3) {
+        if self.gone != brain.gone {
+            self.cover(&brain.gone);
+        }
+        let at = if brain.positions.is_empty() { &self.rest.positions[..] } else { &brain.positions };
         self.near.clear();
         let corners = self.triangles.iter().map(|corners| corners.map(|node| at[node as usize]));
         self.near.extend(corners.filter(|corners| corners[0].distance_squared(tip) < NEAR_MM * NEAR_MM));
     }
 
-    /// Returns the first surface that a ray meets from outside, with the brain's present nodes.
-    pub fn cast(&self, ray: &Ray, positions: &[Vec3]) -> Option<SurfaceHit> {
+    /// Returns the first surface that a ray meets from outside, with the brain as it lies.
+    pub fn cast(&self, ray: &Ray, brain: &Shape) -> Option<SurfaceHit> {
         let bone = self.bone.as_ref().filter(|_| ray.bone).and_then(|bone| of_bone(bone, ray));
-        let at = if positions.is_empty() { &self.rest[..] } else { positions };
+        let at = if brain.positions.is_empty() { &self.rest.positions[..] } else { &brain.positions };
         let brain = match ray.brain {
             true if ray.reach_mm <= SHORT_MM => of_triangles(self.near.iter().copied(), 2.0 * self.edge_mm, ray),
             true => of_triangles(self.triangles.iter().map(|t| t.map(|n| at[n as usize])), 2.0 * self.edge_mm, ray),

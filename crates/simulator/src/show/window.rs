@@ -9,10 +9,10 @@ use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::notice_text;
-use crate::show::picture::{Album, Moving, first_view, frame, microscope, snap};
+use crate::show::picture::{Album, Moving, Shape, first_view, frame, microscope, snap};
 use crate::show::raycast::Raycast;
 use std::path::Path;
-use trepan_geometry::{Buttons, Pose, Vec3};
+use trepan_geometry::{Buttons, Pose, ToolKind, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
@@ -65,6 +65,10 @@ pub(super) struct ViewState {
     /// Whether bone is shown.
     pub bone: bool,
     colours: Colours,
+    /// Why the aspirator takes nothing here.
+    no_aspiration: Option<String>,
+    /// Volume of each tetrahedron of the brain, mm³.
+    volumes_mm3: Vec<f32>,
     /// The place of the opening, RAS mm.
     entry: Vec3,
     keeper: Keeper,
@@ -75,11 +79,16 @@ pub(super) struct ViewState {
 impl ViewState {
     /// Prepares what is shown of a session.
     pub fn of(opened: &SessionView<'_>, bone: bool, stop: &Stop) -> Self {
+        let brain = opened.table.scene.brain.as_ref().map(|brain| &brain.mesh);
         Self {
             case: opened.case.into(),
             program: opened.table.program,
             bone,
             colours: opened.table.colours(),
+            volumes_mm3: brain
+                .map(|mesh| (0..mesh.tets.len()).map(|tet| mesh.volume_mm3(tet) as f32).collect())
+                .unwrap_or_default(),
+            no_aspiration: opened.table.no_aspiration(),
             entry: opened.table.scene.site.entry,
             keeper: Keeper::into_folder(&opened.out.join("window")),
             stop: stop.clone(),
@@ -87,8 +96,18 @@ impl ViewState {
     }
 
     /// Returns the panel of a state; without `by_hand` no tool can be chosen.
-    pub fn panel(&self, view: &View, by_hand: bool) -> Panel {
+    pub fn panel(&self, view: &View, brain: &Shape, by_hand: bool) -> Panel {
         let mut panel = notice_text::panel(&self.case, self.program, view);
+        for choice in &mut panel.choices {
+            let tools = choice.tools.iter().zip(&mut choice.options);
+            let aspirators = tools.filter(|(tool, _)| tool.kind == ToolKind::Aspirator);
+            aspirators.for_each(|(_, (_, why_not))| *why_not = why_not.take().or(self.no_aspiration.clone()));
+        }
+        let taken = |(fill, mm3): (&u16, &f32)| (1.0 - f32::from(*fill) / f32::from(u16::MAX)) * mm3;
+        let taken_mm3: f32 = brain.fills.iter().zip(&self.volumes_mm3).map(taken).sum();
+        if taken_mm3 > 0.0 || view.sample.tool.kind == ToolKind::Aspirator {
+            panel.task.push(("tissue taken".into(), format!("{:.2} ml", 1e-3 * taken_mm3)));
+        }
         if !by_hand {
             let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
             options.for_each(|(_, why_not)| *why_not = Some(NOT_IN_HAND.into()));
@@ -96,9 +115,9 @@ impl ViewState {
         panel
     }
 
-    /// Returns the frame of a state, with the brain at the given positions.
-    pub fn frame<'a>(&'a self, camera: Camera, view: &View, positions: &'a [Vec3]) -> Frame<'a> {
-        let frame = frame(camera, view, Some(positions).filter(|p| !p.is_empty()), self.bone, &self.colours);
+    /// Returns the frame of a state, with the brain as it lies.
+    pub fn frame<'a>(&'a self, camera: Camera, view: &View, brain: &'a Shape) -> Frame<'a> {
+        let frame = frame(camera, view, brain, self.bone, &self.colours);
         // A tool that is still on its way shows air.
         let far = view.sample.state.tip().distance(self.entry) > NEAR_MM;
         Frame { slices: SliceLook { through: far.then_some(self.entry), ..frame.slices }, ..frame }
@@ -121,7 +140,7 @@ impl ViewState {
 struct Show {
     inputs: RenderInputs,
     view: View,
-    positions: Vec<Vec3>,
+    brain: Shape,
     shown: ViewState,
     wanted_rate_hz: f32,
     pointer: Option<MouseHandle>,
@@ -193,7 +212,7 @@ pub(crate) fn show(
     let show = Show {
         inputs,
         view,
-        positions: Vec::new(),
+        brain: Shape::default(),
         shown: ViewState::of(opened, opened.table.bone().is_some(), stop),
         wanted_rate_hz: opened.rate_hz,
         pointer,
@@ -278,16 +297,16 @@ impl window::Session for Show {
     fn update(&mut self, input: &WindowInput) -> Panel {
         self.view = *self.inputs.view.latest().0;
         if let Some(soft) = &mut self.inputs.soft {
-            self.positions.clone_from(&soft.latest().0.positions);
+            self.brain.take(soft.latest().0);
         }
         self.requests.settle(self.view.sample.slot);
-        self.raycast.follow(&self.positions, self.view.sample.state.tip());
+        self.raycast.follow(&self.brain, self.view.sample.state.tip());
         self.send_pose(input);
         let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let step = self.guide.as_mut().map(|guide| guide.follow(view));
-        let usual = || if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into();
+        let usual = || if teaches { TEACH } else { notice_text::hint(&view.sample.tool, by_hand) }.into();
         let hint = step.unwrap_or_else(usual);
         let flap = || Action {
             name: "Lift the flap, or put it back".into(),
@@ -295,7 +314,7 @@ impl window::Session for Show {
             why_not: self.no_flap.then(|| Notice::NO_FLAP.into()),
             ..Action::default()
         };
-        let mut panel = self.shown.panel(view, by_hand);
+        let mut panel = self.shown.panel(view, &self.brain, by_hand);
         panel.warnings.extend(lesson.warnings);
         self.raycast.describe(view, &mut panel);
         // A watcher reads that the other session has ended, and closes the window herself.
@@ -322,13 +341,13 @@ impl window::Session for Show {
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
-        let frame = self.shown.frame(camera, &self.view, &self.positions);
+        let frame = self.shown.frame(camera, &self.view, &self.brain);
         let ghost = self.ghost.map(|pose| (self.view.sample.tool, pose));
         Frame { overlay: Overlay { ghost, markers: &self.markers, ..frame.overlay }, ..frame }
     }
 
     fn surface(&self, ray: &Ray) -> Option<SurfaceHit> {
-        self.raycast.cast(ray, &self.positions)
+        self.raycast.cast(ray, &self.brain)
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {
@@ -465,12 +484,14 @@ mod tests {
         let mut show = Show {
             view: View::at(sample, 1.0),
             inputs: RenderInputs { view, soft: None, film: None },
-            positions: Vec::new(),
+            brain: Shape::default(),
             shown: ViewState {
                 case: "case".into(),
                 program: Program::Brain,
                 bone: false,
                 colours: Colours::default(),
+                no_aspiration: None,
+                volumes_mm3: Vec::new(),
                 entry: Vec3::ZERO,
                 keeper: Keeper::into_folder(Path::new("nowhere")),
                 stop: Stop::default(),

@@ -11,7 +11,14 @@ use trepan_volume::{DistanceField, VoxelVolume};
 pub fn inputs() -> Inputs {
     let case = trepan_fixtures::case_head();
     let tissues = TissueSource::regions_of_aseg(case.aseg);
-    Inputs { name: Some(case.name), ct: Some(case.ct), mri: Some(case.mri), labels: Some(case.labels), tissues }
+    Inputs {
+        name: Some(case.name),
+        ct: Some(case.ct),
+        mri: Some(case.mri),
+        labels: Some(case.labels),
+        tissues,
+        ..Inputs::default()
+    }
 }
 
 /// How it is imported: a skull of 1 mm.
