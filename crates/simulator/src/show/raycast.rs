@@ -16,8 +16,8 @@ use trepan_stages::ahead::{bone_ahead_mm, density};
 use trepan_stages::program::Phase;
 use trepan_window::{Panel, Ray, SurfaceHit};
 
-/// Distance from the tool within which short rays meet the brain, mm.
-const NEAR_MM: f32 = 35.0;
+/// Distance from the tool within which short rays meet the brain, mm: more than at the start.
+const NEAR_MM: f32 = 50.0;
 /// Length up to which a ray is short, mm.
 const SHORT_MM: f32 = 100.0;
 
