@@ -25,7 +25,7 @@ use crate::remark::WELL;
 use crate::space::Space;
 use crate::stages::ImportStages;
 use crate::tissue_class::{TissueSource, make_tumour};
-use crate::{Case, Inputs};
+use crate::{Case, Inputs, MadeTumour};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -206,7 +206,8 @@ impl Images {
     fn preview(&self, program: Program, inputs: &Inputs, recipe: &Recipe) -> Result<Option<Preview>, PatientError> {
         let mask = self.mask.as_ref().map(cropped).transpose()?;
         let inside = mask.as_ref().map(Inside::of);
-        let over = inputs.tumour.zip(inside.as_ref()).map(|(tumour, inside)| over(tumour, inside.middle));
+        let tumour = inputs.tumour.and_then(|tumour| tumour.centre);
+        let over = tumour.zip(inside.as_ref()).map(|(tumour, inside)| over(tumour, inside.middle));
         let recipe = &Recipe { opening: recipe.opening.or(over), ..*recipe };
         let isovalue_hu = self.isovalue_hu;
         let of_bone = |ct: &VoxelVolume<i16>| {
@@ -293,6 +294,9 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     Ok(Images { ct, mri, mask, tissues, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
 }
 
+/// Depth of a tumour's centre below the brain's surface over its radius, numerical: its top shows.
+const TUMOUR_DEPTH: f32 = 0.8;
+
 /// A numerical parameter: loose bone over the skull's, up to which it is specks and the table.
 const FEW_LOOSE: f64 = 0.01;
 
@@ -326,10 +330,8 @@ fn build(
     let (made, mut classes) = (made?, classes?);
     notes.extend(made.as_ref().and_then(|(_, islands)| loose(islands)));
     notes.append(&mut of_classes);
-    if let Some((classes, tumour)) = classes.as_mut().zip(inputs.tumour) {
-        notes.push(make_tumour(tumour, classes)?);
-    }
-    let over = inputs.tumour.zip(classes.as_ref()).map(|(tumour, classes)| over(tumour, middle(classes)));
+    let tumour = inputs.tumour.and_then(|tumour| tumour.centre);
+    let over = tumour.zip(classes.as_ref()).map(|(tumour, classes)| over(tumour, middle(classes)));
     let recipe = &Recipe { opening: recipe.opening.or(over), ..*recipe };
     stages.next("planning the opening")?;
     let on_skull = |(ct, (skull, _)): (_, (VoxelVolume<i16>, _))| {
@@ -353,11 +355,16 @@ fn build(
     stages.next("meshing the brain")?;
     let bare = || Opening::on_bare_brain(&Inside::of(classes.as_ref()?));
     let fineness = Fineness::stepped(recipe.tets, recipe.halvings);
-    let at = |opening: Opening| match inputs.tumour {
-        None => fineness.fine(opening.brain(), -Vec3::from(opening.inward)),
-        Some([x, y, z, radius_mm]) => Fineness::around(Vec3::new(x, y, z), radius_mm, recipe.halvings),
+    let place = opening.or_else(bare);
+    let fine = match (inputs.tumour, classes.as_mut()) {
+        (Some(MadeTumour { centre, radius_mm }), Some(classes)) => {
+            let below = |place: Opening| (place.brain() + TUMOUR_DEPTH * radius_mm * Vec3::from(place.inward)).into();
+            let centre = centre.or(place.map(below)).unwrap_or_default();
+            notes.push(make_tumour(centre, radius_mm, classes)?);
+            Fineness::around(centre.into(), radius_mm, recipe.halvings)
+        }
+        _ => place.and_then(|place| fineness.fine(place.brain(), -Vec3::from(place.inward))),
     };
-    let fine = opening.or_else(bare).and_then(at);
     let brain = mri.zip(classes).map(|(mri, classes)| make_brain(mri, classes, fine, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }

@@ -68,8 +68,17 @@ pub struct Inputs {
     pub labels: Option<PathBuf>,
     /// Label volumes of tissue classes inside the brain.
     pub tissues: Vec<TissueSource>,
-    /// A made tumour, if any: centre, RAS mm, and radius, mm.
-    pub tumour: Option<[f32; 4]>,
+    /// A made tumour, if any.
+    pub tumour: Option<MadeTumour>,
+}
+
+/// A ball of brain that is made a tumour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MadeTumour {
+    /// Its centre, RAS mm; `None` for below the opening, where it comes to the surface.
+    pub centre: Option<[f32; 3]>,
+    /// Its radius, mm.
+    pub radius_mm: f32,
 }
 
 /// Patient data of a session.

@@ -188,6 +188,11 @@ impl TissueSource {
         regions.into_iter().map(of).chain([ventricles]).collect()
     }
 
+    /// Whether its class is a tumour.
+    pub fn is_tumour(&self) -> bool {
+        matches!(self.class, TissueClass::Tumour | TissueClass::SoftTumour)
+    }
+
     /// Reads the label volumes of sources, each file once; returns a mask of each and remarks.
     pub fn read_all(sources: &[Self], notes: &mut Vec<String>) -> Result<Vec<VoxelVolume<u8>>, PatientError> {
         let mut masks = Vec::new();
@@ -284,10 +289,11 @@ impl TissueSource {
 
 /// Makes the brain voxels in a ball a tumour; returns a remark with its volume.
 pub(crate) fn make_tumour(
-    [x, y, z, radius_mm]: [f32; 4],
+    centre: [f32; 3],
+    radius_mm: f32,
     classes: &mut VoxelVolume<u8>,
 ) -> Result<String, PatientError> {
-    let centre = Vec3::new(x, y, z);
+    let ([x, y, z], centre) = (centre, Vec3::from(centre));
     let [nx, ny, _] = classes.dims;
     let voxel_ml = 1e-3 * classes.spacing_mm().element_product();
     let is_in =
@@ -374,14 +380,12 @@ mod tests {
         let mut classes = VoxelVolume::isotropic([20; 3], Vec3::ZERO, 1.0, 1u8);
         classes.data[..20 * 20 * 5].fill(0);
         let whole = classes.clone();
-        for (ball, part) in
-            [([10.0, 10.0, 1.0, 3.0], "0.0 of its 0.1 ml"), ([90.0, 0.0, 0.0, 3.0], "centre in the brain")]
-        {
-            let fault = make_tumour(ball, &mut classes).unwrap_err().to_string();
+        for (centre, part) in [([10.0, 10.0, 1.0], "0.0 of its 0.1 ml"), ([90.0, 0.0, 0.0], "centre in the brain")] {
+            let fault = make_tumour(centre, 3.0, &mut classes).unwrap_err().to_string();
             assert!(fault.starts_with("--tumour") && fault.contains(part), "{fault}");
             assert!(classes == whole, "nothing is painted");
         }
-        let note = make_tumour([10.0, 10.0, 8.0, 4.0], &mut classes).unwrap();
+        let note = make_tumour([10.0, 10.0, 8.0], 4.0, &mut classes).unwrap();
         let made: Vec<usize> = (0..8000).filter(|at| classes.data[*at] == TissueClass::Tumour.code()).collect();
         assert!(note.contains("ml of brain around 10,10,8") && (200..268).contains(&made.len()), "{}", made.len());
         assert!(made.iter().all(|at| whole.data[*at] == 1), "brain alone");

@@ -68,8 +68,8 @@ pub struct Summary {
     pub hand_force_scale: f32,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
-    /// Tissue classes of which an aspirator took something, the most first.
-    pub resected: Vec<Resected>,
+    /// What an aspirator took; `null` if nothing.
+    pub resection: Option<Resection>,
     /// Voxels of `removed-label.nii.gz`; `null` without bone.
     pub removed_label: Option<RemovedLabel>,
     /// Pieces of bone cut off the skull, such as a flap, at the end.
@@ -138,11 +138,20 @@ pub struct RemovedLabel {
     pub label_mm3: f64,
 }
 
-/// What an aspirator took of a tissue class.
+/// What an aspirator took.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Resection {
+    /// Share of the tumour that is gone, 0 to 1; 0 without a tumour.
+    pub tumour_share: f64,
+    /// Volume of other tissue that is gone, mm³.
+    pub healthy_mm3: f64,
+    /// The tissue classes of which something is gone, by name.
+    pub tissues: BTreeMap<String, Resected>,
+}
+
+/// What an aspirator took of a tissue class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Resected {
-    /// Name of the class.
-    pub tissue: String,
     /// Volume taken, mm³.
     pub taken_mm3: f64,
     /// Volume left, mm³.

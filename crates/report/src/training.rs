@@ -28,6 +28,9 @@ pub struct Lesson {
     /// Diameter of the planned flap, mm; 0 for a burr hole.
     #[serde(default)]
     pub flap_mm: f32,
+    /// Radius of a tumour that is made below the opening, mm; none without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tumour_mm: Option<f32>,
     /// The tool at the start, by its place in the tray.
     #[serde(default)]
     pub slot: usize,
@@ -68,6 +71,8 @@ pub enum Measure {
     HoldS,
     /// Force on the hand, N.
     ForceN,
+    /// Tissue taken by the aspirator, ml.
+    TakenMl,
     /// Place of the tool in the tray.
     Slot,
     /// Nothing: the last step.
@@ -96,12 +101,13 @@ fn bone_programs() -> Vec<String> {
 }
 
 /// Lessons of the programs.
-const OWN: [&str; 5] = [
+const OWN: [&str; 6] = [
     include_str!("../lessons/1-first-operation.json"),
     include_str!("../lessons/2-straight-through.json"),
     include_str!("../lessons/3-flap.json"),
     include_str!("../lessons/4-press.json"),
     include_str!("../lessons/5-retract.json"),
+    include_str!("../lessons/6-resect.json"),
 ];
 
 impl Lesson {
@@ -144,7 +150,7 @@ impl Lesson {
 
 impl Step {
     /// Whether a running session has reached the target.
-    fn is_reached(&self, view: &View) -> bool {
+    fn is_reached(&self, view: &View, taken_ml: f64) -> bool {
         let value = match self.until {
             Measure::BoneDepthMm => view.depth_mm[0].into(),
             Measure::TissueDepthMm => view.depth_mm[1].into(),
@@ -153,6 +159,7 @@ impl Step {
             Measure::Flap => f64::from(view.flap as u8),
             Measure::HoldS => view.hold_s,
             Measure::ForceN => view.force.length().into(),
+            Measure::TakenMl => taken_ml,
             Measure::Slot => view.sample.slot as f64,
             Measure::Never => return false,
         };
@@ -199,10 +206,10 @@ impl Guide {
     }
 
     /// Goes on to the next step once the present one is reached; returns the text of the present
-    /// one.
-    pub fn follow(&mut self, view: &View) -> String {
+    /// one. `taken_ml`: tissue taken by the aspirator.
+    pub fn follow(&mut self, view: &View, taken_ml: f64) -> String {
         let count = self.lesson.steps.len();
-        if self.lesson.steps.get(self.at).is_some_and(|step| step.is_reached(view)) && self.at + 1 < count {
+        if self.lesson.steps.get(self.at).is_some_and(|step| step.is_reached(view, taken_ml)) && self.at + 1 < count {
             self.at += 1;
         }
         let text = self.lesson.steps.get(self.at).map_or("", |step| &step.text);
@@ -232,7 +239,7 @@ mod tests {
     #[test]
     fn a_program_has_its_own_lessons_only() {
         let names = |program| Lesson::of(program, None).into_iter().map(|lesson| lesson.name).collect::<Vec<_>>();
-        assert_eq!(names(Program::Brain), ["press", "retract"]);
+        assert_eq!(names(Program::Brain), ["press", "retract", "resect"]);
         assert_eq!(names(Program::Craniotomy), ["first-operation", "through", "flap"]);
         assert_eq!(names(Program::Integrated), names(Program::Craniotomy));
         for lesson in Lesson::all(None) {
@@ -250,7 +257,7 @@ mod tests {
         let sample = ToolSample { tick: 0, state, tool, slot: 3, drilling: false };
         let mut guide = Guide::new(Lesson::all(None).remove(2));
         let mut view = View { removed_mm3: 5000.0, ..View::at(sample, 1.0) };
-        let mut text = |view: &View| (0..9).map(|_| guide.follow(view)).last().unwrap_or_default();
+        let mut text = |view: &View| (0..9).map(|_| guide.follow(view, 0.0)).last().unwrap_or_default();
         assert!(text(&view).starts_with("Step 3"), "half a lap is no flap");
         view.flap = FlapPlace::Free;
         assert!(text(&view).contains("Lift the flap"));
@@ -264,12 +271,25 @@ mod tests {
         let sample = ToolSample { tick: 0, state, tool: Program::Integrated.tray()[0], slot: 0, drilling: false };
         let mut view = View::at(sample, 1.0);
         let mut guide = Guide::new(Lesson::all(None).remove(0));
-        assert!(guide.follow(&view).starts_with("Step 1 of 6"));
+        assert!(guide.follow(&view, 0.0).starts_with("Step 1 of 6"));
         view.depth_mm[0] = 0.1;
-        assert!(guide.follow(&view).starts_with("Step 2"));
-        assert!(guide.follow(&view).starts_with("Step 2"), "nothing is removed yet");
+        assert!(guide.follow(&view, 0.0).starts_with("Step 2"));
+        assert!(guide.follow(&view, 0.0).starts_with("Step 2"), "nothing is removed yet");
         view.removed_mm3 = 50.0;
-        assert!(guide.follow(&view).starts_with("Step 3"));
+        assert!(guide.follow(&view, 0.0).starts_with("Step 3"));
+    }
+
+    #[test]
+    fn a_resection_goes_on_with_what_was_taken() {
+        let state = ToolState::at(Pose::IDENTITY);
+        let sample = ToolSample { tick: 0, state, tool: Program::Brain.tray()[2], slot: 2, drilling: false };
+        let (view, lesson) = (View::at(sample, 1.0), Lesson::all(None).remove(5));
+        assert_eq!(lesson.tumour_mm, Some(7.5));
+        let mut guide = Guide::new(lesson);
+        assert!(guide.follow(&view, 0.0).starts_with("Step 1 of 5"));
+        assert!(guide.follow(&view, 0.1).starts_with("Step 2"));
+        assert!(guide.follow(&view, 0.1).starts_with("Step 2"));
+        assert!(guide.follow(&view, 0.9).starts_with("Step 3"));
     }
 
     #[test]

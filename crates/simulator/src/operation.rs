@@ -5,10 +5,12 @@ use crate::options::Options;
 use serde::{Deserialize, Serialize};
 use trepan_haptics::DeviceName;
 use trepan_measurements::{aspirator, brain_living, support};
-use trepan_patient::TissueClass;
+use trepan_patient::{MadeTumour, TissueClass, TissueSource};
 
 /// Default diameter of the flap that the scripts `flap` and `resect` cut, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
+/// Radius of the tumour that the script `resect` takes where the case has none, mm.
+const SCRIPTED_TUMOUR_MM: &[f32] = &[7.5];
 /// Default factor by which the fluid drains faster than in a patient.
 const CSF_SPEED_UP: f32 = support::DRAIN_SPEED_UP.f32();
 /// Default Young's modulus of the brain in a slow test, kPa.
@@ -37,6 +39,8 @@ pub(crate) struct Operation {
     pub young_modulus_kpa: f32,
     /// Brain that the aspirator takes in a second for each area in contact, mm/s; 0 for none.
     pub aspiration_mm_s: f32,
+    /// Made tumour: its radius, mm, after its centre, RAS mm, if that is given; empty without one.
+    pub tumour: Vec<f32>,
     /// Haptic tick rate, Hz.
     pub rate_hz: f32,
     /// Whether the brain's tools require an open skull; false for a watcher.
@@ -55,6 +59,7 @@ impl Default for Operation {
             forbidden: vec![TissueClass::Vessel],
             young_modulus_kpa: YOUNG_KPA,
             aspiration_mm_s: ASPIRATION_MM_S,
+            tumour: Vec::new(),
             rate_hz: RATE_HZ,
             opening_needed: true,
             force_waits: true,
@@ -63,11 +68,27 @@ impl Default for Operation {
 }
 
 impl Operation {
+    /// The made tumour; `None` without one.
+    pub fn made_tumour(&self) -> Option<MadeTumour> {
+        match self.tumour[..] {
+            [radius_mm] => Some(MadeTumour { centre: None, radius_mm }),
+            [x, y, z, radius_mm] => Some(MadeTumour { centre: Some([x, y, z]), radius_mm }),
+            _ => None,
+        }
+    }
+
     /// Takes settings from the options, and missing ones from the replayed recording, if any.
     pub fn of(options: &Options, device: &DeviceName, recorded: Option<&Self>) -> Self {
         let cuts_flap = matches!(device.operation(), Some("flap" | "resect"));
         let flap_mm = if cuts_flap { SCRIPTED_FLAP_MM } else { 0.0 };
-        let base = recorded.cloned().unwrap_or_else(|| Self { flap_mm, ..Self::default() });
+        let tumour = if device.operation() == Some("resect") { SCRIPTED_TUMOUR_MM } else { &[] };
+        let base = recorded.cloned().unwrap_or_else(|| Self { flap_mm, tumour: tumour.into(), ..Self::default() });
+        let makes_none = options.case.is_some() || options.patient.tissues.iter().any(TissueSource::is_tumour);
+        let tumour = match options.patient.tumour {
+            Some(MadeTumour { centre, radius_mm }) => centre.into_iter().flatten().chain([radius_mm]).collect(),
+            None if makes_none => Vec::new(),
+            None => base.tumour,
+        };
         let keeps_line = options.flap_line.is_empty() && options.flap.is_none();
         // A watcher does not see the bone that was drilled before it joined.
         let watches = options.watch.is_some();
@@ -79,6 +100,7 @@ impl Operation {
             forbidden: options.forbid.clone().unwrap_or(base.forbidden),
             young_modulus_kpa: options.young_modulus_kpa.unwrap_or(base.young_modulus_kpa),
             aspiration_mm_s: options.aspiration.unwrap_or(base.aspiration_mm_s),
+            tumour,
             rate_hz: options.rate_hz.unwrap_or(base.rate_hz),
             opening_needed: base.opening_needed && !watches,
             force_waits: base.force_waits && !watches,
@@ -95,10 +117,14 @@ mod tests {
     fn options_override_the_recording_and_the_recording_the_defaults() {
         let parse = |line: &str| Options::try_parse_from(line.split(' ')).unwrap();
         let script = DeviceName::scripted("flap");
+        let resection = Operation::of(&parse("x"), &DeviceName::scripted("resect"), None);
+        assert_eq!((resection.flap_mm, &resection.tumour[..]), (SCRIPTED_FLAP_MM, SCRIPTED_TUMOUR_MM));
+        let labelled = Operation::of(&parse("x --tissue tumour=a.nii"), &DeviceName::scripted("resect"), None);
+        assert!(labelled.made_tumour().is_none() && resection.made_tumour().is_some_and(|made| made.centre.is_none()));
         let usual = Operation::of(&parse("x"), &DeviceName::MOUSE, None);
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, None, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
-        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --aspiration 0.5 --rate-hz 500 --watch other";
+        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --aspiration 0.5 --tumour 1,2,3,4 --rate-hz 500 --watch other";
         let drawn = Options { flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]], ..parse(line) };
         let given = Operation::of(&drawn, &script, None);
         assert!(!given.opening_needed && usual.opening_needed && usual.force_waits);

@@ -9,7 +9,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use trepan_budget::Quality;
 use trepan_models::ingredients::{KeyValue, setting};
-use trepan_patient::{TissueClass, TissueSource};
+use trepan_patient::{MadeTumour, TissueClass, TissueSource};
 use trepan_report::constants;
 use trepan_stages::force_scale::ForceScale;
 use trepan_stages::program::Program;
@@ -226,9 +226,9 @@ pub struct Patient {
     /// all voxel sizes
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub opening: Option<[f32; 3]>,
-    /// Make a tumour: centre and radius, RAS mm; the opening is over it
-    #[arg(long, value_name = "X,Y,Z,R", value_parser = tumour, allow_hyphen_values = true)]
-    pub tumour: Option<[f32; 4]>,
+    /// Make a tumour of a radius, mm, below the opening or around a point; the opening is over it
+    #[arg(long, value_name = "[X,Y,Z,]R", value_parser = tumour, allow_hyphen_values = true)]
+    pub tumour: Option<MadeTumour>,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
     #[arg(long, value_name = "HU", allow_negative_numbers = true)]
     pub isovalue_hu: Option<i16>,
@@ -480,12 +480,12 @@ fn point(text: &str) -> Result<[f32; 3], String> {
     if point.iter().all(|v| v.abs() <= 1e4) { Ok(point) } else { Err(remedy.into()) }
 }
 
-fn tumour(text: &str) -> Result<[f32; 4], String> {
-    let remedy =
-        "expected X,Y,Z,R in mm: right, anterior and superior positive, then a radius of 2 to 40, as in 30,40,80,7.5";
-    let (place, radius) = text.rsplit_once(',').ok_or(remedy)?;
-    let ([x, y, z], radius) = (point(place).map_err(|_| remedy)?, radius.trim().parse().map_err(|_| remedy)?);
-    if (2.0..=40.0).contains(&radius) { Ok([x, y, z, radius]) } else { Err(remedy.into()) }
+fn tumour(text: &str) -> Result<MadeTumour, String> {
+    let remedy = "expected R or X,Y,Z,R in mm: a radius of 2 to 40, below the opening or around a point (right, anterior and superior positive), as in 7.5 or 30,40,80,7.5";
+    let (place, radius) = text.rsplit_once(',').map_or((None, text), |(place, radius)| (Some(place), radius));
+    let centre = place.map(point).transpose().map_err(|_| remedy)?;
+    let radius_mm = radius.trim().parse().map_err(|_| remedy)?;
+    if (2.0..=40.0).contains(&radius_mm) { Ok(MadeTumour { centre, radius_mm }) } else { Err(remedy.into()) }
 }
 
 fn quality(text: &str) -> Result<Quality, String> {
@@ -620,8 +620,10 @@ mod tests {
         assert!(parse("x --force-scale 2").unwrap().check().unwrap_err().to_string().contains("0.01 to 1"));
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
-        assert_eq!(parse("x --tumour -40,30.5,80,7.5").unwrap().patient.tumour, Some([-40.0, 30.5, 80.0, 7.5]));
-        for bad in ["1,2,3", "1,2,3,0", "1,2,3,-5", "1,2,3,nan", "1,2,nan,5", "1,2,3,99", "a"] {
+        let made = |centre, radius_mm| Some(MadeTumour { centre, radius_mm });
+        assert_eq!(parse("x --tumour -40,30.5,80,7.5").unwrap().patient.tumour, made(Some([-40.0, 30.5, 80.0]), 7.5));
+        assert_eq!(parse("x --tumour 10").unwrap().patient.tumour, made(None, 10.0));
+        for bad in ["1,2,3", "1,9", "1,2,3,0", "1,2,3,-5", "1,2,3,nan", "1,2,nan,5", "1,2,3,99", "a"] {
             let fault = parse(&format!("x --tumour {bad}")).unwrap_err().to_string();
             assert!(fault.contains("radius of 2 to 40"), "{fault}");
         }

@@ -267,13 +267,14 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
 #[test]
 fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
     let (recording, setup, fills) = operated_by(aspirating, "--set element=locking-free --aspiration 50", 1100);
-    let resected = setup.resected(&fills);
-    let taken_mm3: f64 = resected.iter().map(|resected| resected.taken_mm3).sum();
-    assert!(taken_mm3 > 30.0 && resected.len() == 2 && resected[0].tissue == "brain", "{resected:?}");
+    let resection = setup.resection(&fills).unwrap();
+    let names: Vec<&str> = resection.tissues.keys().map(String::as_str).collect();
+    assert!(resection.healthy_mm3 > 30.0 && names == ["brain", "grey"], "{resection:?}");
+    assert_eq!(resection.tumour_share, 0.0, "there is none");
     assert!(fills.iter().any(|fill| (1..u16::MAX).contains(fill)));
     assert_eq!(replayed(&recording).0, END - 1);
     let (pressed, without, whole) = operated_by(aspirating, "--set element=locking-free --aspiration 0", 1100);
-    assert!(whole.is_empty() && without.resected(&whole).is_empty());
+    assert!(whole.is_empty() && without.resection(&whole).is_none());
     let sum_n = |recording: &Recording| recording.ticks.iter().map(|tick| tick.wrench.force.length()).sum::<f32>();
     assert!(sum_n(&recording) < 0.97 * sum_n(&pressed), "{} {} N", sum_n(&recording), sum_n(&pressed));
     let (_, rival, whole) = operated_by(aspirating, "--set search=hashed-grid", END);

@@ -7,7 +7,7 @@ use crate::error::SessionError;
 use crate::hand::{self, OpenDevice};
 use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
-use crate::options::Options;
+use crate::options::{Options, Patient};
 use crate::recordings;
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
@@ -24,12 +24,9 @@ use trepan_haptics::script::Script;
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse, spacemouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording, SceneWriter};
-use trepan_patient::Plan;
-use trepan_patient::PlanComparison;
-use trepan_patient::Scene;
 use trepan_patient::identity::Identity;
 use trepan_patient::progress::Progress;
-use trepan_patient::{self as patient, Inputs, PatientError};
+use trepan_patient::{self as patient, Inputs, MadeTumour, PatientError, Plan, PlanComparison, Scene};
 use trepan_render::Camera;
 use trepan_report::debrief::Debrief;
 use trepan_report::drilled::{self, Drilled};
@@ -130,6 +127,8 @@ impl Session {
         let settled = recording.as_deref().or(watched.as_ref());
         let recorded = settled.map(|settled| SessionConfig::of(&settled.header)).transpose()?;
         let operation = Operation::of(&options, &device, recorded.as_ref().map(|config| &config.operation));
+        let mut options = options;
+        options.patient.tumour = operation.made_tumour().filter(|_| program.has_tissue());
         let request = ModelRequest::of(program, &options, &operation, recorded.as_ref())?;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
@@ -257,7 +256,7 @@ impl Session {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
             plan: self.setup.bone().and_then(|bone| PlanComparison::of(&self.setup.plan, bone)),
             regions: self.setup.regions(&recording),
-            resected: outcome.solver.as_ref().map_or_else(Vec::new, |solver| self.setup.resected(&solver.fills)),
+            resection: self.setup.resection(fills),
             remarks,
             machine: Machine::here(adapter),
             ..self.about(&album)
@@ -577,7 +576,9 @@ fn lesson_of(program: Program, options: Options) -> Result<(Option<Lesson>, Opti
         || SessionError::Usage(format!("{} has no lesson {name}: --lesson takes {}", program.name(), names()));
     let lesson = all.iter().find(|lesson| lesson.name == *name).cloned().ok_or_else(unknown)?;
     let flap = options.flap.or(Some(lesson.flap_mm));
-    Ok((Some(lesson.clone()), Options { flap, first_slot: lesson.slot, ..options }))
+    let made = lesson.tumour_mm.map(|radius_mm| MadeTumour { centre: None, radius_mm });
+    let patient = Patient { tumour: options.patient.tumour.or(made), ..options.patient.clone() };
+    Ok((Some(lesson.clone()), Options { flap, patient, first_slot: lesson.slot, ..options }))
 }
 
 /// Device of a hand, if any.

@@ -21,7 +21,7 @@ use trepan_patient::anchors::BrainSupport;
 use trepan_patient::remark;
 use trepan_patient::{RestBrain, Scene, TissueClass};
 use trepan_report::regions::{Region, regions};
-use trepan_report::summary::Resected;
+use trepan_report::summary::{Resected, Resection};
 use trepan_rigid::{Extent, Method};
 use trepan_runtime::{Stages, Tissue};
 use trepan_stages::collision_step::CollisionStage;
@@ -108,19 +108,27 @@ impl SessionSetup {
         self.brain().map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
     }
 
-    /// What is missing of each tissue class with what is left of each tetrahedron, of 65535.
-    pub fn resected(&self, fills: &[u16]) -> Vec<Resected> {
-        let Some(brain) = self.brain().filter(|_| !fills.is_empty()) else { return Vec::new() };
+    /// What is missing of the brain, from what is left of each tetrahedron, of 65535; `None` if
+    /// nothing is.
+    pub fn resection(&self, fills: &[u16]) -> Option<Resection> {
+        let brain = self.brain().filter(|_| fills.iter().any(|fill| *fill < u16::MAX))?;
         let (whole, left) = (brain.left_mm3(&vec![u16::MAX; fills.len()]), brain.left_mm3(fills));
-        let of = |(class, (whole, left_mm3)): (TissueClass, (f64, f64))| Resected {
-            tissue: class.name().into(),
-            taken_mm3: whole - left_mm3,
-            left_mm3,
-        };
-        let all = TissueClass::ALL.into_iter().zip(whole.into_iter().zip(left)).map(of);
-        let mut some: Vec<Resected> = all.filter(|resected| resected.taken_mm3 > 0.0).collect();
-        some.sort_by(|a, b| b.taken_mm3.total_cmp(&a.taken_mm3));
-        some
+        let (mut made, mut tumour) = (Resection::default(), Resected::default());
+        for (class, (whole, left_mm3)) in TissueClass::ALL.into_iter().zip(whole.into_iter().zip(left)) {
+            let of = Resected { taken_mm3: whole - left_mm3, left_mm3 };
+            match class {
+                TissueClass::Tumour | TissueClass::SoftTumour => {
+                    tumour.taken_mm3 += of.taken_mm3;
+                    tumour.left_mm3 += left_mm3;
+                }
+                _ => made.healthy_mm3 += of.taken_mm3,
+            }
+            if of.taken_mm3 > 0.0 {
+                made.tissues.insert(class.name().into(), of);
+            }
+        }
+        made.tumour_share = tumour.taken_mm3 / (tumour.taken_mm3 + tumour.left_mm3).max(1e-9);
+        Some(made)
     }
 
     /// Name of the tissue solver that runs.

@@ -182,8 +182,8 @@ pub(crate) fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
 }
 
 /// A point outside the skull, RAS mm, over a tumour, as seen from the middle of the head.
-pub(crate) fn over([x, y, z, _]: [f32; 4], middle: Vec3) -> [f32; 3] {
-    (middle + OVER_MM * (Vec3::new(x, y, z) - middle).normalize_or(Vec3::Z)).into()
+pub(crate) fn over(tumour: [f32; 3], middle: Vec3) -> [f32; 3] {
+    (middle + OVER_MM * (Vec3::from(tumour) - middle).normalize_or(Vec3::Z)).into()
 }
 
 /// Distance of that point from the middle of the head, mm: outside of every skull.

@@ -103,16 +103,21 @@ impl ViewState {
             let aspirators = tools.filter(|(tool, _)| tool.kind == ToolKind::Aspirator);
             aspirators.for_each(|(_, (_, why_not))| *why_not = why_not.take().or(self.no_aspiration.clone()));
         }
-        let taken = |(fill, mm3): (&u16, &f32)| (1.0 - f32::from(*fill) / f32::from(u16::MAX)) * mm3;
-        let taken_mm3: f32 = brain.fills.iter().zip(&self.volumes_mm3).map(taken).sum();
-        if taken_mm3 > 0.0 || view.sample.tool.kind == ToolKind::Aspirator {
-            panel.task.push(("tissue taken".into(), format!("{:.2} ml", 1e-3 * taken_mm3)));
+        let taken_ml = self.taken_ml(brain);
+        if taken_ml > 0.0 || view.sample.tool.kind == ToolKind::Aspirator {
+            panel.task.push(("tissue taken".into(), format!("{taken_ml:.2} ml")));
         }
         if !by_hand {
             let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
             options.for_each(|(_, why_not)| *why_not = Some(NOT_IN_HAND.into()));
         }
         panel
+    }
+
+    /// Tissue that is gone, ml.
+    fn taken_ml(&self, brain: &Shape) -> f64 {
+        let taken = |(fill, mm3): (&u16, &f32)| f64::from(u16::MAX - *fill) / f64::from(u16::MAX) * f64::from(*mm3);
+        1e-3 * brain.fills.iter().zip(&self.volumes_mm3).map(taken).sum::<f64>()
     }
 
     /// Returns the frame of a state, with the brain as it lies.
@@ -305,7 +310,7 @@ impl window::Session for Show {
         let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
-        let step = self.guide.as_mut().map(|guide| guide.follow(view));
+        let step = self.guide.as_mut().map(|guide| guide.follow(view, self.shown.taken_ml(&self.brain)));
         let usual = || if teaches { TEACH } else { notice_text::hint(&view.sample.tool, by_hand) }.into();
         let hint = step.unwrap_or_else(usual);
         let flap = || Action {
