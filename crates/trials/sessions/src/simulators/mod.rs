@@ -1,5 +1,5 @@
 //! The simulators: warnings before breaches, scores that tell hands apart, flaps, replays, tumours
-//! that are felt, long sessions.
+//! that are felt and taken away, long sessions.
 
 mod bench;
 mod brain;
@@ -8,6 +8,7 @@ mod hands;
 mod holes;
 mod rates;
 pub mod readers;
+mod resection;
 mod sessions;
 
 use anyhow::Result;
@@ -28,6 +29,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
         on_the_table.map(|(name, found)| tried(name, move |_| case::CaseFixture::new().map(|table| found(&table)))),
     );
     parts.push(tried("brain", |_| brain::findings()));
+    parts.push(tried("resection", resection::findings));
     parts.push(tried("replays", sessions::replays));
     if !scope.quick {
         parts.push(tried("long session", |_| sessions::soak(LONG_MIN)));
