@@ -219,6 +219,10 @@ impl SessionSetup {
     fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<Tissue, SessionError> {
         let (BrainSupport { fixed, anchors, mut wall }, settling) = self.held(brain)?;
         let body = brain.body(with.materials(self.young_mpa), with.pia_arachnoid_n_per_mm, &fixed, &anchors);
+        // The graphics card cannot take tissue away yet.
+        let resects = self.plan.target.is_some() && self.operation.aspiration_mm_s > 0.0;
+        let device = if resects && with.device == SolverDevice::Fastest { SolverDevice::Cpu } else { with.device };
+        let with = &Ingredients { device, ..with.clone() };
         let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
         let _first = self.ran.set(ran);
         let touch = touch(&brain.mesh, with)?;
