@@ -83,8 +83,10 @@ impl Operation {
         let flap_mm = if cuts_flap { SCRIPTED_FLAP_MM } else { 0.0 };
         let tumour = if device.operation() == Some("resect") { SCRIPTED_TUMOUR_MM } else { &[] };
         let base = recorded.cloned().unwrap_or_else(|| Self { flap_mm, tumour: tumour.into(), ..Self::default() });
+        // A folder is not built again.
+        let given = options.patient.tumour.filter(|_| options.case.is_none());
         let makes_none = options.case.is_some() || options.patient.tissues.iter().any(TissueSource::is_tumour);
-        let tumour = match options.patient.tumour {
+        let tumour = match given {
             Some(MadeTumour { centre, radius_mm }) => centre.into_iter().flatten().chain([radius_mm]).collect(),
             None if makes_none => Vec::new(),
             None => base.tumour,

@@ -128,7 +128,8 @@ impl Session {
         let recorded = settled.map(|settled| SessionConfig::of(&settled.header)).transpose()?;
         let operation = Operation::of(&options, &device, recorded.as_ref().map(|config| &config.operation));
         let mut options = options;
-        options.patient.tumour = operation.made_tumour().filter(|_| program.has_tissue());
+        let made = operation.made_tumour().filter(|_| program.has_tissue());
+        options.patient.tumour = options.patient.tumour.or(made);
         let request = ModelRequest::of(program, &options, &operation, recorded.as_ref())?;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
