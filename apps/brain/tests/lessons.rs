@@ -9,6 +9,11 @@ fn a_script_passes_every_lesson() {
     let lessons = [
         ("script:press", ("press", include_str!("../../../crates/report/lessons/4-press.json"))),
         ("script:retract", ("retract", include_str!("../../../crates/report/lessons/5-retract.json"))),
+        // A script does not see where the tumour sinks to, and need not be slow.
+        (
+            "script:resect --duration 45 --aspiration 50 --csf-loss 0",
+            ("resect", include_str!("../../../crates/report/lessons/6-resect.json")),
+        ),
     ];
     passing::all_pass(env!("CARGO_BIN_EXE_brain"), &lessons);
 }

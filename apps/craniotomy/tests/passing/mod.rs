@@ -4,13 +4,15 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Runs a script in a lesson of a program, and returns the marks that it fails.
+/// Runs a script, with its flags, in a lesson of a program, and returns the marks that it fails.
 fn failed(program: &str, script: &str, lesson: (&str, &str)) -> Vec<String> {
     let out = tempfile::tempdir().unwrap();
     let (name, json) = lesson;
     let ended = Command::new(program)
         .args(["--headless", "--frames-per-second", "0", "--quality", "draft"])
-        .args(["--device", script, "--lesson", name, "--out"])
+        .arg("--device")
+        .args(script.split(' '))
+        .args(["--lesson", name, "--out"])
         .arg(out.path())
         .env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"))
         .stdout(Stdio::null())
