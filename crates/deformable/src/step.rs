@@ -96,10 +96,20 @@ impl TissueCollision {
         self.shell.points.len()
     }
 
-    /// Takes a tetrahedron away: from the next step on its faces are border. Nothing happens to one
-    /// that [`resectable`](Self::resectable) did not name.
-    pub fn remove(&mut self, tet: u32) {
-        if !self.surface.may_go(tet) || !std::mem::take(&mut self.live[tet as usize]) {
+    /// Tells what is left of a tetrahedron, of 65535: its surface presses by as much, and with
+    /// nothing left its faces are border from the next step on. Nothing happens to one that
+    /// [`resectable`](Self::resectable) did not name.
+    pub fn thin(&mut self, tet: u32, fill: u16) {
+        if self.surface.may_go(tet) {
+            self.surface.thin(tet, f32::from(fill) / f32::from(u16::MAX));
+            if fill == 0 {
+                self.remove(tet);
+            }
+        }
+    }
+
+    fn remove(&mut self, tet: u32) {
+        if !std::mem::take(&mut self.live[tet as usize]) {
             return;
         }
         for (face, next) in std::mem::replace(&mut self.neighbours[tet as usize], [NONE; 4]).into_iter().enumerate() {

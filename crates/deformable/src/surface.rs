@@ -31,6 +31,8 @@ const CLUSTER: usize = 32;
 const GROUP: usize = 16;
 /// Clusters fitted at every step at least.
 const SLICE: usize = 12;
+/// Steps until an exposed face presses in full; numerical.
+const GROWTH: f32 = 20.0;
 /// Time of the fit of a cluster that is no border yet.
 const UNUSED: u32 = u32::MAX;
 /// Motion between two fits of a box that is always allowed for, mm.
@@ -62,6 +64,11 @@ pub struct MovingSurface {
     /// Triangle of each face of each tetrahedron, or [`NONE`]; empty where nothing can be removed.
     triangle_of_face: Vec<[u32; 4]>,
     may_go: Vec<bool>,
+    /// What is left of each tetrahedron, of 1; empty where nothing can be removed.
+    left: Vec<f32>,
+    /// How far each triangle presses by now, of 1, and those that do not press in full yet.
+    grown: Vec<f32>,
+    growing: Vec<u32>,
     /// Clusters that have been border, which alone have a box; those since the last fit.
     used: Vec<u32>,
     fresh: Vec<u32>,
@@ -105,6 +112,9 @@ impl MovingSurface {
         surface.used.reserve(surface.boxes.len());
         surface.fresh.reserve(surface.boxes.len());
         surface.may_go = (0..mesh.tets.len() as u32).map(may_go).collect();
+        surface.left = vec![1.0; mesh.tets.len()];
+        surface.grown = vec![1.0; surface.triangles.len()];
+        surface.growing.reserve(surface.triangles.len());
         surface.triangle_of_face = vec![[NONE; 4]; mesh.tets.len()];
         for (triangle, &number) in along_morton_curve(mesh, &faces, &live).iter().enumerate() {
             let [tet, face] = order[number as usize];
@@ -129,13 +139,38 @@ impl MovingSurface {
     pub(crate) fn expose(&mut self, tet: u32, face: usize) {
         let triangle = self.triangle_of_face[tet as usize][face];
         let Some(live) = self.live.get_mut(triangle as usize) else { return };
-        *live = true;
+        if !std::mem::replace(live, true) {
+            self.grown[triangle as usize] = 0.0;
+            self.growing.push(triangle);
+        }
         let cluster = triangle / CLUSTER as u32;
         if !self.is_used(cluster as usize) {
             self.used.push(cluster);
             self.fresh.push(cluster);
             self.fitted_at[cluster as usize] = 0;
         }
+    }
+
+    /// Tells what is left of a tetrahedron, of 1.
+    pub(crate) fn thin(&mut self, tet: u32, left: f32) {
+        self.left[tet as usize] = left;
+    }
+
+    /// How much a triangle presses, of 1: what is left of its tetrahedron, and less in the first
+    /// steps after it was exposed. So no force jumps where a tetrahedron goes.
+    pub(crate) fn share(&self, triangle: u32) -> f32 {
+        let grown = self.grown.get(triangle as usize).copied().unwrap_or(1.0);
+        let tet = self.tet_of_triangle[triangle as usize];
+        grown * self.left.get(tet as usize).copied().unwrap_or(1.0)
+    }
+
+    fn grow(&mut self) {
+        let grown = &mut self.grown;
+        self.growing.retain(|&triangle| {
+            let share = &mut grown[triangle as usize];
+            *share = (*share + 1.0 / GROWTH).min(1.0);
+            *share < 1.0
+        });
     }
 
     /// Whether a cluster has been border.
@@ -170,6 +205,9 @@ impl MovingSurface {
                 .collect(),
             fresh: Vec::new(),
             may_go: Vec::new(),
+            left: Vec::new(),
+            grown: Vec::new(),
+            growing: Vec::new(),
             triangle_of_face: Vec::new(),
             live,
             nodes_of_cluster,
@@ -193,6 +231,7 @@ impl MovingSurface {
         }
         let turns = if self.step == 0 { 1 } else { self.used.len().div_ceil(SLICE).max(1) };
         self.step += 1;
+        self.grow();
         (self.stale, self.motion) = (0, LEAST_MOTION.max(0.9 * self.motion));
         for at in (self.step as usize % turns..self.used.len()).step_by(turns) {
             self.fit(positions, self.used[at] as usize);

@@ -49,7 +49,7 @@ fn a_hole_is_felt_as_in_the_mesh_without_it_by_every_search() {
     for (turn, batch) in order.chunks(9).enumerate() {
         for &tet in batch {
             gone[tet as usize] = true;
-            all.iter_mut().for_each(|(_, collision)| collision.remove(tet));
+            all.iter_mut().for_each(|(_, collision)| collision.thin(tet, 0));
         }
         let wave = |p: &Vec3| *p + Vec3::X * 0.5 * (0.4 * p.z + 0.2 * turn as f32).sin();
         let positions: Vec<Vec3> = mesh.positions.iter().map(wave).collect();
@@ -59,18 +59,22 @@ fn a_hole_is_felt_as_in_the_mesh_without_it_by_every_search() {
             tets: (0..count).filter(|&t| !gone[t as usize]).map(|t| mesh.tets[t as usize]).collect(),
             positions: mesh.positions.clone(),
         };
+        if turn % 8 != 5 {
+            continue;
+        }
         let mut anew = TissueStep::default();
         collision(&left, "brute", |_| false).step(&positions, &velocities, &tool, &mut anew);
         for (name, collision) in &mut all {
             let mut step = TissueStep::default();
-            collision.step(&positions, &velocities, &tool, &mut step);
+            // What comes to light presses in full after 20 steps, and the normal follows in 200.
+            (0..200).for_each(|_| collision.step(&positions, &velocities, &tool, &mut step));
             assert!(step.points_in_contact == anew.points_in_contact, "{name} in turn {turn}");
             assert!(alike(felt(&step), felt(&anew)), "{name} in turn {turn}: {:?} {:?}", felt(&step), felt(&anew));
             assert_eq!((step.skipped, step.stale, step.overflow), (0, 0, 0), "{name} in turn {turn}");
         }
         touched += u32::from(anew.manifold.depth_mm > 0.1);
     }
-    assert!(touched > 10, "{touched}");
+    assert!(touched > 3, "{touched}");
 }
 
 #[test]
@@ -104,10 +108,37 @@ fn all_of_a_body_can_go_and_what_may_not_stays() {
         step.points_in_contact
     };
     assert!(press(&mut collision) > 0);
-    (0..mesh.tets.len() as u32).for_each(|t| collision.remove(t));
+    (0..mesh.tets.len() as u32).for_each(|t| collision.thin(t, 0));
     assert_eq!(press(&mut collision), 0);
-    collision.remove(u32::MAX);
+    collision.thin(u32::MAX, 0);
     let mut kept = self::collision(&mesh, "walk", |_| false);
-    (0..mesh.tets.len() as u32).for_each(|t| kept.remove(t));
+    (0..mesh.tets.len() as u32).for_each(|t| kept.thin(t, 0));
     assert!(press(&mut kept) > 0);
+}
+
+/// A ball rests 1 mm deep in a block of which tetrahedra thin out in turn, each over 100 steps.
+#[test]
+fn the_force_does_not_jump_where_tissue_thins_and_goes() {
+    let mesh = cube(8);
+    let mut collision = collision(&mesh, "walk", |_| true);
+    let tool = ToolState::at(Pose::from_translation(Vec3::new(12.0, 12.5, EDGE_MM + 1.0)));
+    let away = |tet: u32| centre(&mesh, tet).distance(tool.tip());
+    let (velocities, mut step) = (vec![Vec3::ZERO; mesh.positions.len()], TissueStep::default());
+    let mut near: Vec<u32> = (0..mesh.tets.len() as u32).filter(|&tet| away(tet) < 4.0).collect();
+    near.sort_by(|&a, &b| away(a).total_cmp(&away(b)));
+    let mut press = |collision: &mut TissueCollision| {
+        collision.step(&mesh.positions, &velocities, &tool, &mut step);
+        step.patch.force_n * step.patch.normal
+    };
+    let start = press(&mut collision);
+    let (mut last, mut jump) = (start, 0.0f32);
+    for tet in near {
+        for left in (0..100u16).rev() {
+            collision.thin(tet, 655 * left);
+            let force = press(&mut collision);
+            jump = jump.max(force.distance(std::mem::replace(&mut last, force)));
+        }
+    }
+    assert!(start.length() > 1.5 && last.length() < 0.01, "{start} {last}");
+    assert!(jump < 0.03 * start.length(), "{jump} of {}", start.length());
 }

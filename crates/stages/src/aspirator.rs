@@ -8,8 +8,9 @@
 //! dV = c · A / N · dt for each of the N points inside      φ = left / V
 //! ```
 //! So what is taken grows with contact and time, not with the tool's speed or the mesh. A
-//! tetrahedron with less than a tenth left goes as a whole, and so does a small piece that no face
-//! joins to the rest any more.
+//! tetrahedron with less than a tenth left leaves, and so does a small piece that no face joins to
+//! the rest any more: what is left of it goes in equal parts over 20 ms, so that neither force nor
+//! stress jumps.
 //!
 //! # Practice
 //! A step costs 211 additions, and a search of at most 800 tetrahedra for each that goes; it does
@@ -29,6 +30,9 @@ use trepan_mesh::{TetMesh, Topology};
 const FILLS: [f32; 2] = [u16::MAX as f32, 0.1 * u16::MAX as f32];
 /// Longest time that counts between two steps, ms: a pause takes nothing.
 const LONGEST_MS: f64 = 5.0;
+
+/// Time in which a whole tetrahedron that leaves goes, ms, numerical.
+const LEAVES_MS: f32 = 20.0;
 
 /// Tetrahedra of the largest loose piece that is sucked away, numerical.
 const LOOSE: usize = 200;
@@ -83,20 +87,31 @@ pub(crate) struct Aspirator {
     left_mm3: Vec<f32>,
     last_ms: f64,
     pieces: Pieces,
+    /// Tetrahedra that go by themselves, each once.
+    leaving: Vec<u32>,
+    leaves: Vec<bool>,
     /// Volume taken so far, mm³.
     pub taken_mm3: f64,
-    /// Tetrahedra that went in the last step.
-    pub gone: Vec<u32>,
+    /// Tetrahedra of which something went in the last step, each once.
+    pub thinned: Vec<u32>,
+    /// The step that took of each tetrahedron last.
+    taken_in: Vec<u64>,
+    steps: u64,
 }
 
 impl Aspirator {
     /// Of a mesh whose tetrahedra are taken at a rate, mm/ms: mm³ for each mm² of contact.
     pub fn of(mesh: &TetMesh, rates: &[f32]) -> Self {
         let volumes_mm3: Vec<f32> = (0..mesh.tets.len()).map(|t| mesh.volume_mm3(t) as f32).collect();
+        let tets = volumes_mm3.len();
         Self {
-            rates: (0..mesh.tets.len()).map(|t| rates.get(t).copied().unwrap_or(0.0).max(0.0)).collect(),
+            rates: (0..tets).map(|t| rates.get(t).copied().unwrap_or(0.0).max(0.0)).collect(),
             left_mm3: volumes_mm3.clone(),
-            gone: Vec::with_capacity(volumes_mm3.len()),
+            thinned: Vec::with_capacity(tets),
+            taken_in: vec![0; tets],
+            steps: 0,
+            leaving: Vec::with_capacity(tets),
+            leaves: vec![false; tets],
             volumes_mm3,
             last_ms: f64::NEG_INFINITY,
             pieces: Pieces::of(mesh),
@@ -106,37 +121,52 @@ impl Aspirator {
 
     /// Takes what the tool touches, and lowers the fills of those tetrahedra.
     pub fn step(&mut self, sample: &ToolSample, tool: &TissueCollision, fills: &mut [u16]) {
-        self.gone.clear();
+        self.thinned.clear();
+        self.steps += 1;
         let now_ms = sample.state.time_ms;
         let dt_ms = (now_ms - std::mem::replace(&mut self.last_ms, now_ms)).clamp(0.0, LONGEST_MS) as f32;
-        if sample.tool.kind != ToolKind::Aspirator || !sample.state.buttons.has(Buttons::PEDAL) {
-            return;
-        }
-        let area_mm2 = 4.0 * PI * sample.tool.tip_radius_mm.powi(2) / tool.points() as f32;
-        for tet in tool.tets_touched() {
-            let t = tet as usize;
-            let taken = (self.rates[t] * area_mm2 * dt_ms).min(self.left_mm3[t]);
-            if taken <= 0.0 {
-                continue;
-            }
-            self.left_mm3[t] -= taken;
-            self.taken_mm3 += f64::from(taken);
-            let fill = FILLS[0] * self.left_mm3[t] / self.volumes_mm3[t];
-            fills[t] = fill as u16;
-            if fill < FILLS[1] {
-                self.taken_mm3 += f64::from(std::mem::take(&mut self.left_mm3[t]));
-                fills[t] = 0;
-                self.gone.push(tet);
+        if sample.tool.kind == ToolKind::Aspirator && sample.state.buttons.has(Buttons::PEDAL) {
+            let area_mm2 = 4.0 * PI * sample.tool.tip_radius_mm.powi(2) / tool.points() as f32;
+            for tet in tool.tets_touched() {
+                self.take(tet, self.rates[tet as usize] * area_mm2 * dt_ms, fills);
             }
         }
-        for at in 0..self.gone.len() {
-            for beside in self.pieces.neighbours[self.gone[at] as usize] {
-                for &tet in self.pieces.loose(beside, fills, &self.rates) {
-                    fills[tet as usize] = 0;
-                    self.taken_mm3 += f64::from(std::mem::take(&mut self.left_mm3[tet as usize]));
-                    self.gone.push(tet);
+        for at in 0..self.leaving.len() {
+            let tet = self.leaving[at];
+            self.take(tet, self.volumes_mm3[tet as usize] * dt_ms / LEAVES_MS, fills);
+        }
+        self.leaving.retain(|tet| fills[*tet as usize] > 0);
+        for at in 0..self.thinned.len() {
+            let tet = self.thinned[at] as usize;
+            for from in self.pieces.neighbours[tet].into_iter().filter(|_| fills[tet] == 0) {
+                for &loose in self.pieces.loose(from, fills, &self.rates) {
+                    if !std::mem::replace(&mut self.leaves[loose as usize], true) {
+                        self.leaving.push(loose);
+                    }
                 }
             }
+        }
+    }
+
+    /// Takes at most a volume of a tetrahedron, mm³.
+    fn take(&mut self, tet: u32, at_most_mm3: f32, fills: &mut [u16]) {
+        let t = tet as usize;
+        let taken = at_most_mm3.min(self.left_mm3[t]);
+        if taken <= 0.0 {
+            return;
+        }
+        self.left_mm3[t] -= taken;
+        self.taken_mm3 += f64::from(taken);
+        let fill = FILLS[0] * self.left_mm3[t] / self.volumes_mm3[t];
+        fills[t] = fill as u16;
+        if fills[t] == 0 {
+            self.taken_mm3 += f64::from(std::mem::take(&mut self.left_mm3[t]));
+        }
+        if fill < FILLS[1] && !std::mem::replace(&mut self.leaves[t], true) {
+            self.leaving.push(tet);
+        }
+        if std::mem::replace(&mut self.taken_in[t], self.steps) != self.steps {
+            self.thinned.push(tet);
         }
     }
 }

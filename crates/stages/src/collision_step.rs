@@ -47,7 +47,7 @@ impl CollisionStage {
         let Some(aspirator) = &mut self.aspirator else { return };
         aspirator.step(sample, &self.tools[sample.slot], &mut self.loads.fills);
         for tool in &mut self.tools {
-            aspirator.gone.iter().for_each(|&tet| tool.remove(tet));
+            aspirator.thinned.iter().for_each(|&tet| tool.thin(tet, self.loads.fills[tet as usize]));
         }
     }
 
@@ -231,6 +231,7 @@ mod tests {
         let mut solver =
             SolverStage::new(Box::new(Tled::new(&Body::uniform(mesh, fixed, Material::BRAIN), &config).unwrap()));
         let (mut frame, mut by_law, mut most_n) = (SoftFrame::default(), 0.0, 0.0f32);
+        let (mut before, mut jump) = (Vec3::ZERO, 0.0f32);
         for tick in 1..=900u64 {
             let z = 18.0 + tool.tip_radius_mm - 0.01 * tick.min(600) as f32;
             let mut state = ToolState::at(Pose::from_translation(Vec3::new(12.3, 12.2, z)));
@@ -240,10 +241,13 @@ mod tests {
             let point_mm2 = 4.0 * PI * f64::from(tool.tip_radius_mm).powi(2) / stage.tools[0].points() as f64;
             by_law += if tick > 1 { f64::from(record.points) * point_mm2 * f64::from(RATE) } else { 0.0 };
             most_n = most_n.max(stage.patch().force_n);
+            let force = stage.patch().force_n * stage.patch().normal;
+            jump = jump.max(force.distance(std::mem::replace(&mut before, force)));
             while solver.time_ms() < tick as f64 {
                 solver.step(stage.loads(), record.seq);
             }
         }
+        assert!(jump < 0.005, "the force jumps by {jump} N");
         let faults = solver.solver_faults();
         assert_eq!((faults.limited, faults.non_finite, faults.skipped_ms), (0, 0, 0.0), "{faults:?}");
         let fills = &stage.loads().fills;

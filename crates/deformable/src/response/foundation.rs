@@ -20,6 +20,11 @@
 //! foundation's stiffness, `ε Σ wᵢ A_q`. Row sums exceed the matrix that they stand for (Hughes
 //! 2000), so what solvers take implicitly is never too little.
 //!
+//! Where tissue is taken away, the area counts by what is left of the tetrahedron behind it, and a
+//! face that comes to light counts in full only after some steps. A triangle counts by how much it
+//! faces the tool, and the touched normal is followed no faster than the tool moves. So the force
+//! does not jump where tissue goes.
+//!
 //! # Practice
 //! Points are a quarter of the ball's radius apart. A ball pressed deeper than half its radius,
 //! which a hand can only do in a jump, grows upwards, its lowest point fixed, so that its centre
@@ -50,6 +55,9 @@ pub(crate) struct Foundation {
     grips: [Vec<Grip>; 2],
     /// The tool's pose in the last step.
     before: Option<Pose>,
+    /// Normal of the touched surface, followed, and how far the ball has grown, mm.
+    touched: Vec3,
+    grown: Vec3,
 }
 
 /// How places are pressed.
@@ -120,12 +128,14 @@ impl Pass<'_> {
         let width = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f32::max).sqrt();
         let (gap_mm, inwards) = self.rod.gap(middle);
         let twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let faces = twice_area.dot(inwards) > 0.0 || twice_area.dot(self.touched) > SAME_SIDE * twice_area.length();
+        let double_mm2 = twice_area.length();
+        let facing = (twice_area.dot(inwards)).max(twice_area.dot(self.touched) - SAME_SIDE * double_mm2);
+        let faces = (facing / (FACING * double_mm2)).clamp(0.0, 1.0);
         let rest_mm2 = surface.rest_area_mm2[number as usize];
         let along = ((2.0 * rest_mm2).sqrt() / (SPACING * self.scene.radius_mm)).ceil();
         let along = along.clamp(1.0, MOST_ALONG as f32) as u32;
-        let area_mm2 = rest_mm2.max(0.5 * twice_area.length()) / (along * along) as f32;
-        (gap_mm < self.waiting_mm + width && faces).then_some((corners, along, area_mm2))
+        let area_mm2 = faces * surface.share(number) * rest_mm2.max(0.5 * double_mm2) / (along * along) as f32;
+        (gap_mm < self.waiting_mm + width && faces > 0.0).then_some((corners, along, area_mm2))
     }
 }
 
@@ -133,6 +143,9 @@ impl Pass<'_> {
 pub(super) const WAITING: f32 = 0.25;
 /// Depth from which the ball grows, radii.
 const GROWS: f32 = 0.5;
+/// Most that the touched normal and the ball, in radii, change in a step for a tool at rest;
+/// numerical.
+const FOLLOWS: f32 = 0.01;
 /// Widest spacing of points, radii.
 const SPACING: f32 = 0.25;
 /// Most points along an edge.
@@ -155,20 +168,23 @@ impl Foundation {
             numbers: Vec::with_capacity(MAX_NEAR),
             grips: [Vec::with_capacity(MAX_GRIPS), Vec::with_capacity(MAX_GRIPS)],
             before: None,
+            touched: Vec3::ZERO,
+            grown: Vec3::ZERO,
         }
     }
 
     /// Forgets where tool and tissue held each other.
     pub(crate) fn reset(&mut self) {
         self.grips.iter_mut().for_each(Vec::clear);
-        self.before = None;
+        (self.before, self.touched, self.grown) = (None, Vec3::ZERO, Vec3::ZERO);
     }
 
     /// Writes the springs of the surface near the tool, and what the hand feels of them. `out`
     /// holds the depth of the ball along one normal, if it touches.
     pub(crate) fn press(&mut self, scene: &Scene, surface: &mut MovingSurface, out: &mut TissueStep) {
         let (touched, depth_mm) = (out.manifold.normal, out.manifold.depth_mm);
-        let rod = self.radii.at(scene.tool, touched * (depth_mm - GROWS * scene.radius_mm).max(0.0));
+        self.follow(scene, touched, depth_mm);
+        let (touched, rod) = (self.touched, self.radii.at(scene.tool, self.grown));
         let mut pass =
             Pass { scene, rod, touched, waiting_mm: WAITING * scene.radius_mm, last: 0, felt: ToolForce::default() };
         self.springs.clear();
@@ -184,6 +200,20 @@ impl Foundation {
         if !out.surface_springs.is_empty() {
             self.feel(scene, &pass.felt, out);
         }
+    }
+
+    /// Follows the touched normal, and grows the ball by what its depth asks for, no faster than
+    /// the tool moves but for a little: both jump where tissue goes, and the force would with them.
+    fn follow(&mut self, scene: &Scene, touched: Vec3, depth_mm: f32) {
+        let moved_mm = self.before.map_or(f32::INFINITY, |before| before.translation.distance(scene.tool.tip()));
+        let most = moved_mm / scene.radius_mm + FOLLOWS;
+        let towards = |from: Vec3, to: Vec3, most: f32| match (to - from).clamp_length_max(most) {
+            change if change.is_finite() && moved_mm < scene.radius_mm => from + change,
+            _ => to,
+        };
+        self.touched = towards(self.touched, touched, most);
+        let grown = self.touched * (depth_mm - GROWS * scene.radius_mm).max(0.0);
+        self.grown = towards(self.grown, grown, most * scene.radius_mm);
     }
 
     /// Lists the triangles near the tool, each once, in order; returns how many did not fit.
@@ -312,6 +342,8 @@ impl Foundation {
 /// A triangle belongs to the touched side when its normal is within 70 degrees of the touched
 /// normal.
 const SAME_SIDE: f32 = 0.34;
+/// Cosine from which a triangle counts in full, numerical.
+const FACING: f32 = 0.2;
 
 /// Centroids of a triangle split into `along²` equal ones, as weights on its corners.
 fn points(along: u32) -> impl Iterator<Item = [f32; 3]> {
