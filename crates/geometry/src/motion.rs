@@ -162,5 +162,7 @@ mod tests {
             assert_eq!((asks.taken(), asks.in_slot(), asks.has(Buttons::PEDAL)), (Some(kind), Some(at), false));
         }
         assert_eq!((both.taken(), both.in_slot()), (None, None));
+        let recorded = [ToolKind::Burr, ToolKind::Aspirator, ToolKind::Bipolar].map(Buttons::take);
+        assert_eq!(recorded, [1, 6, 7].map(|kind| Buttons(kind << 8)), "a recording holds the kind by its number");
     }
 }

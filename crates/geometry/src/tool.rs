@@ -15,12 +15,15 @@ pub enum ToolKind {
     Spatula,
     /// A suction tube: touches, never cuts.
     Aspirator,
+    /// Forceps that coagulate bleeding tissue between their tips while the pedal is down, and
+    /// rinse.
+    Bipolar,
 }
 
 impl ToolKind {
     /// All kinds.
-    pub const ALL: [Self; 6] =
-        [Self::Burr, Self::Probe, Self::Perforator, Self::Craniotome, Self::Spatula, Self::Aspirator];
+    pub const ALL: [Self; 7] =
+        [Self::Burr, Self::Probe, Self::Perforator, Self::Craniotome, Self::Spatula, Self::Aspirator, Self::Bipolar];
 
     /// Whether it removes bone while the pedal is down.
     pub fn cuts(self) -> bool {
@@ -36,6 +39,7 @@ impl ToolKind {
             Self::Craniotome => "craniotome",
             Self::Spatula => "spatula",
             Self::Aspirator => "aspirator",
+            Self::Bipolar => "bipolar",
         }
     }
 }
@@ -100,5 +104,10 @@ impl Tool {
     /// A suction tube of 3 mm.
     pub const fn aspirator() -> Self {
         Self { kind: ToolKind::Aspirator, shaft_radius_mm: 1.5, ..Self::probe(1.5) }
+    }
+
+    /// Bipolar forceps, here closed: a rod of 2 mm with a round end.
+    pub const fn bipolar() -> Self {
+        Self { kind: ToolKind::Bipolar, shaft_radius_mm: 1.0, ..Self::probe(1.0) }
     }
 }

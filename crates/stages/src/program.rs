@@ -107,7 +107,7 @@ impl Phase {
 /// How many of the tray's tools cut bone; they come first.
 const BONE_TOOLS: usize = 4;
 /// Every tool.
-const TRAY: [Tool; 7] = [
+const TRAY: [Tool; 8] = [
     Tool::burr(3.0),
     Tool::burr(2.0),
     Tool::perforator(),
@@ -115,6 +115,7 @@ const TRAY: [Tool; 7] = [
     Tool::probe(2.0),
     Tool::spatula(),
     Tool::aspirator(),
+    Tool::bipolar(),
 ];
 
 /// Name of a tool in the tray: its kind and width.

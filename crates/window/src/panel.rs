@@ -10,6 +10,7 @@ use crate::plot::{Trace, TraceStyle};
 use crate::words::{sentence, tr};
 use crate::{Choice, Panel, tool_icon};
 use eframe::egui::{self, Color32, RichText};
+use trepan_geometry::ToolKind;
 
 /// The clicks in the panel.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -148,14 +149,16 @@ fn wide(ui: &egui::Ui, text: RichText, height: f32) -> egui::Button<'static> {
 
 /// The button that is held down to drill.
 fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
-    if !panel.by_hand || panel.no_bone && !panel.aspirates {
+    if !panel.by_hand || panel.no_bone && panel.on_tissue.is_none() {
         return;
     }
-    let name = match (panel.aspirates, panel.drilling) {
-        (false, false) => "Hold to drill (Space)",
-        (false, true) => "Drilling (Space)",
-        (true, false) => "Hold to aspirate (Space)",
-        (true, true) => "Aspirating (Space)",
+    let name = match (panel.on_tissue, panel.drilling) {
+        (None, false) => "Hold to drill (Space)",
+        (None, true) => "Drilling (Space)",
+        (Some(ToolKind::Bipolar), false) => "Hold to coagulate (Space)",
+        (Some(ToolKind::Bipolar), true) => "Coagulating (Space)",
+        (Some(_), false) => "Hold to aspirate (Space)",
+        (Some(_), true) => "Aspirating (Space)",
     };
     let name = RichText::new(tr(name)).strong();
     let pedal = match panel.drilling {

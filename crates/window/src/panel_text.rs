@@ -1,7 +1,7 @@
 //! The data that a session sends to its window.
 
 use std::sync::Arc;
-use trepan_geometry::{Tool, Twist, Vec3};
+use trepan_geometry::{Tool, ToolKind, Twist, Vec3};
 
 /// Contents of the panel beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,10 +16,10 @@ pub struct Panel {
     pub tool: String,
     /// Whether mouse and keys move the tool; then pedal, next tool and undo are shown.
     pub by_hand: bool,
-    /// Whether the drill or the aspirator runs.
+    /// Whether the tool that the pedal runs is running.
     pub drilling: bool,
-    /// Whether the pedal runs an aspirator.
-    pub aspirates: bool,
+    /// Kind of the tool for tissue that the pedal runs; `None` for a drill.
+    pub on_tissue: Option<ToolKind>,
     /// The current sounds of drill and alarm.
     pub sound: Sound,
     /// Largest force since the last picture, N.

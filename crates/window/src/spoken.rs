@@ -5,7 +5,7 @@ use crate::*;
 use eframe::egui::Key;
 use egui_kittest::kittest::{By, NodeT, Queryable};
 use std::collections::HashMap;
-use trepan_geometry::Tool;
+use trepan_geometry::{Tool, ToolKind};
 
 /// The program's German texts.
 fn german() -> Language {
@@ -19,10 +19,10 @@ fn german() -> Language {
 }
 
 /// Panels of a hand with the mouse, of a script and of a replay.
-fn panels() -> [Panel; 5] {
-    let soft = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator()];
+fn panels() -> [Panel; 7] {
+    let soft = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator(), Tool::bipolar()];
     let tools = [Tool::burr(3.0), Tool::perforator(), Tool::craniotome()].into_iter().chain(soft).collect();
-    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula", "aspirator"];
+    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula", "aspirator", "bipolar"];
     let options = names.map(|name| (name.to_string(), None)).into();
     let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
     let by_hand = Panel { by_hand: true, rate_hz: 1000.0, choices: vec![choice], ..Panel::default() };
@@ -30,10 +30,10 @@ fn panels() -> [Panel; 5] {
     let marks = [mark].into();
     let timeline = Timeline { at_s: 2.0, length_s: 9.0, ready_s: 5.0, running: true, speed: 1.0, marks };
     let script = Panel { by_hand: false, ..by_hand.clone() };
-    let aspirates = |drilling| Panel { aspirates: true, drilling, ..by_hand.clone() };
-    let of_aspirator = [false, true].map(aspirates);
-    let [rests, runs] = of_aspirator;
-    [Panel { drilling: true, ..by_hand }, rests, runs, script.clone(), Panel { timeline: Some(timeline), ..script }]
+    let on_tissue = |kind| [false, true].map(|drilling| Panel { on_tissue: Some(kind), drilling, ..by_hand.clone() });
+    let [[rests, runs], [cold, hot]] = [ToolKind::Aspirator, ToolKind::Bipolar].map(on_tissue);
+    let replay = Panel { timeline: Some(timeline), ..script.clone() };
+    [Panel { drilling: true, ..by_hand }, rests, runs, cold, hot, script, replay]
 }
 
 #[test]

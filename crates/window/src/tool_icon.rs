@@ -37,6 +37,12 @@ pub(crate) fn show(ui: &mut egui::Ui, tool: &Tool, number: usize, name: &str, st
 fn silhouette(painter: &egui::Painter, area: egui::Rect, tool: &Tool, ink: Color32) {
     let tip = egui::pos2(area.left() + 9.0, area.center().y);
     let end = egui::pos2(area.right() - 2.0, tip.y);
+    if tool.kind == ToolKind::Bipolar {
+        for apart in [-6.0, 6.0] {
+            painter.line_segment([tip, end + egui::vec2(0.0, apart)], Stroke::new(2.0, ink));
+        }
+        return;
+    }
     painter.line_segment([tip, end], Stroke::new((2.0 * SCALE * tool.shaft_radius_mm).max(2.0), ink));
     painter.circle_filled(tip, (SCALE * tool.tip_radius_mm).max(2.5), ink);
     if tool.cutting_mm > 0.0 {
@@ -54,5 +60,6 @@ fn use_of(kind: ToolKind) -> &'static str {
         ToolKind::Probe => "Presses the brain",
         ToolKind::Spatula => "Retracts the brain",
         ToolKind::Aspirator => "Takes brain tissue away while its pedal is down",
+        ToolKind::Bipolar => "Coagulates bleeding tissue while its pedal is down, and rinses",
     }
 }

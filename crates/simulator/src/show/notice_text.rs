@@ -29,7 +29,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
-    let aspirates = sample.tool.kind == ToolKind::Aspirator;
+    let on_tissue = Some(sample.tool.kind).filter(|kind| matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar));
     let brain_mm = match view.brain_distance_mm {
         mm if mm.is_finite() => format!("{mm:.1} mm"),
         _ => "no brain here".into(),
@@ -56,8 +56,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         case: case.into(),
         phase: ["Craniotomy", "Brain"][sample.phase() as usize].into(),
         tool: called(&sample.tool),
-        drilling: sample.drilling || aspirates && sample.state.buttons.has(Buttons::PEDAL),
-        aspirates,
+        drilling: sample.drilling || on_tissue.is_some() && sample.state.buttons.has(Buttons::PEDAL),
+        on_tissue,
         sound: Sound {
             spindle: view.spindle,
             load: view.force.length() / view.force_limit_n.max(1e-3),
@@ -69,7 +69,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
         values: values.into_iter().chain(band).chain(second).collect(),
         task,
         no_bone: !program.has_bone(),
-        no_drill: (!sample.tool.kind.cuts() && !aspirates)
+        no_drill: (!sample.tool.kind.cuts() && on_tissue.is_none())
             .then(|| format!("the {} does not drill: take a tool for bone with its number key", called(&sample.tool))),
         warnings: urgent(view.warnings).map(|warning| warning.text().into()).collect(),
         technical: technical(view.warnings).map(|warning| warning.text().into()).collect(),
@@ -123,6 +123,9 @@ pub(crate) fn hint(tool: &Tool, by_hand: bool) -> &'static str {
         }
         (Phase::Brain, true) if tool.kind == ToolKind::Aspirator => {
             "point at the brain and hold the left button to take tissue away there; it does not come back"
+        }
+        (Phase::Brain, true) if tool.kind == ToolKind::Bipolar => {
+            "point at tissue that bleeds and hold the left button to coagulate it; let go to draw back"
         }
         (Phase::Brain, true) => "point at the brain and hold the left button to press it; let go to draw back",
     }
@@ -187,7 +190,7 @@ mod tests {
             let panel = panel("c", Program::Integrated, &View { bone_open, ..view(0) });
             panel.choices[0].options.iter().filter(|(_, why_not)| why_not.is_some()).count()
         };
-        assert_eq!((closed(false), closed(true)), (3, 0), "probe, spatula and aspirator");
+        assert_eq!((closed(false), closed(true)), (4, 0), "probe, spatula, aspirator and bipolar");
     }
 
     #[test]
