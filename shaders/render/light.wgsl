@@ -116,13 +116,21 @@ fn burr_colour(point: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
     return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
 }
 
-// Shades a tool hit `met`; `look` is the style of its tip.
+// Closed tines with a dark gap between them, bare at the tips and insulated above.
+fn tines_colour(point: vec3f, normal: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
+    let bare = dot(point - tip.xyz, normalize(tail.xyz - tip.xyz)) < 8.0;
+    let beside = smoothstep(0.1, 0.3, abs(dot(normal, scene.spin.xyz)));
+    return beside * select(vec3f(0.13, 0.22, 0.42), vec3f(0.62, 0.66, 0.72), bare);
+}
+
+// Shades a tool hit `met`; `look` is the tool's style.
 fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, look: f32) -> vec3f {
     let on_tip = min(met.y, met.z) > met.x;
     let normal = tool_normal(point, tip, tail, met);
     var colour = vec3f(0.62, 0.66, 0.72);
     if on_tip && look == 1.0 { colour = burr_colour(point, tip, tail); }
     if on_tip && look == 2.0 && dot(normal, normalize(tip.xyz - tail.xyz)) > 0.75 { colour = vec3f(0.02); }
+    if look == 3.0 { colour = tines_colour(point, normal, tip, tail); }
     return lit(colour, normal, along, 1.0, 1.0, 0.7);
 }
 

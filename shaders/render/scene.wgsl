@@ -18,7 +18,7 @@ struct Scene {
     second_tail: vec4f,       // as `tail`
     brain_cut: vec4f,         // unit normal and offset of the plane over which the brain is cut away; zeroes: none
     bone_cut: vec4f,          // the same for bone
-    tips: vec4f,              // how the tools' tips look, first and second: 1 fluted, 2 the mouth of a tube, 0 smooth; z: steps of the cut's lattice a voxel; w: voxels from one point of the smoothed CT to the next
+    tips: vec4f,              // how the tools look, first and second: 1 a fluted tip, 2 the mouth of a tube, 3 two tines, 0 smooth; z: steps of the cut's lattice a voxel; w: voxels from one point of the smoothed CT to the next
     bone_paint: array<vec4f, 2>,    // lower corner of the colours over bone (w: 1 if there are any), one over the box's size
     brain_paint: array<vec4f, 2>,   // the same over the brain at rest
 }

@@ -89,11 +89,12 @@ impl Scene {
 const NO_TOOL: Tool =
     Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0, cutting_mm: 0.0 };
 
-/// Style of a tool's tip: fluted, the mouth of a tube, or smooth.
+/// Style of a tool: a fluted tip, the mouth of a tube, two tines, or smooth.
 fn look(kind: ToolKind) -> f32 {
     match kind {
         cutting if cutting.cuts() => 1.0,
         ToolKind::Aspirator => 2.0,
+        ToolKind::Bipolar => 3.0,
         _ => 0.0,
     }
 }

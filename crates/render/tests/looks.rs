@@ -84,6 +84,7 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
         ("cut with bone", Frame { cut: open, ..base }),
         ("drilling", Frame { drilling: true, ..base }),
         ("tube and mill", Frame { tool: Some(Tool::aspirator()), second: Some((Tool::craniotome(), aside)), ..base }),
+        ("tines", Frame { tool: Some(Tool::bipolar()), ..base }),
         ("both eyes", Frame { stereo: stereo(StereoLook::SideBySide), ..all }),
         ("anaglyph", Frame { stereo: stereo(StereoLook::Anaglyph), ..all }),
         ("all with slices", Frame { slices: SliceLook::default(), ..all }),
@@ -127,7 +128,7 @@ fn pictures_are_the_stored_ones_by_all_that_draw() {
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
     let mut on_device = device().map(|gpu| scene::renderer(&gpu, &data, size));
     let (paint, markers) = (blue(4.0, 1), [Vec3::new(10.0, 24.0, -6.0), Vec3::new(0.0, 0.0, 0.0)]);
-    for (name, frame) in frames(&paint, &markers).into_iter().take(10) {
+    for (name, frame) in frames(&paint, &markers).into_iter().take(11) {
         on_processor.draw(&frame).expect("drawn");
         let mut images = vec![on_processor.image().clone()];
         images.extend(on_device.as_mut().map(|device| {

@@ -165,7 +165,9 @@ pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
     colour.lerp(mark / share.max(1e-3), 0.45 * share)
 }
 
-/// Shades a tool hit; `look` is the style of its tip.
+const STEEL: Vec3 = Vec3::new(0.62, 0.66, 0.72);
+
+/// Shades a tool hit; `look` is the tool's style.
 fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &ToolHit, look: f32) -> Vec3 {
     let on_tip = met.t() == met.at[0];
     let axis = (met.tail - met.tip).truncate().normalize();
@@ -173,9 +175,16 @@ fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &ToolHit, look: f32)
     let colour = match look {
         1.0 if on_tip => burr_colour(scene, point, met, axis),
         2.0 if on_tip && normal.dot(-axis) > 0.75 => Vec3::splat(0.02),
-        _ => Vec3::new(0.62, 0.66, 0.72),
+        3.0 => tines_colour(scene, normal, (point - met.tip.truncate()).dot(axis)),
+        _ => STEEL,
     };
     lit(scene, colour, normal, along, 1.0, 1.0, 0.7)
+}
+
+/// Closed tines with a dark gap between them, bare at the tips and insulated above.
+fn tines_colour(scene: &Scene, normal: Vec3, above_mm: f32) -> Vec3 {
+    let beside = smoothstep(0.1, 0.3, normal.dot(scene.spin.truncate()).abs());
+    beside * if above_mm < 8.0 { STEEL } else { Vec3::new(0.13, 0.22, 0.42) }
 }
 
 fn burr_colour(scene: &Scene, point: Vec3, met: &ToolHit, axis: Vec3) -> Vec3 {
