@@ -96,9 +96,10 @@ impl TissueCollision {
         self.shell.points.len()
     }
 
-    /// Tells what is left of a tetrahedron, of 65535: its surface presses by as much, and with
-    /// nothing left its faces are border from the next step on. Nothing happens to one that
-    /// [`resectable`](Self::resectable) did not name.
+    /// Tells what is left of a tetrahedron, of 65535: its surface presses by as much.
+    ///
+    /// With nothing left it is gone from the next step on, and what it covered is border. Nothing
+    /// happens to one that [`resectable`](Self::resectable) did not name.
     pub fn thin(&mut self, tet: u32, fill: u16) {
         if self.surface.may_go(tet) {
             self.surface.thin(tet, f32::from(fill) / f32::from(u16::MAX));

@@ -202,8 +202,8 @@ impl Foundation {
         }
     }
 
-    /// Follows the touched normal, and grows the ball by what its depth asks for, no faster than
-    /// the tool moves but for a little: both jump where tissue goes, and the force would with them.
+    /// Follows the touched normal and grows the ball by what its depth asks for. Both jump where
+    /// tissue goes, and the force would with them: they follow no faster than the tool moves.
     fn follow(&mut self, scene: &Scene, touched: Vec3, depth_mm: f32) {
         let moved_mm = self.before.map_or(f32::INFINITY, |before| before.translation.distance(scene.tool.tip()));
         let most = moved_mm / scene.radius_mm + FOLLOWS;
