@@ -1,8 +1,8 @@
 // The deformed brain's surface as triangles with smooth normals. Output 0: octahedral normal (xy),
 // 1 on a cut (z), distance along the ray in mm (w). Output 1: the rest position, for sampling the
-// MRI.
+// MRI, and the stain (w): blood in mm, towards -1 a burn.
 
-@group(0) @binding(1) var<storage, read> places: array<vec4f>;    // now, world mm
+@group(0) @binding(1) var<storage, read> places: array<vec4f>;    // now, world mm, and the stain
 @group(0) @binding(2) var<storage, read> normals: array<vec4f>;   // now, unit
 @group(0) @binding(3) var<storage, read> rest: array<vec4f>;      // at rest, world mm
 @group(0) @binding(4) var<storage, read> corners: array<u32>;     // three vertices a triangle
@@ -12,6 +12,7 @@ struct Corner {
     @location(0) place: vec3f,
     @location(1) normal: vec3f,
     @location(2) rest: vec3f,
+    @location(3) stain: f32,
 }
 
 struct SurfacePoint {
@@ -22,11 +23,11 @@ struct SurfacePoint {
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> Corner {
     let v = corners[i];
     let place = places[v].xyz;
-    return Corner(scene.clip_from_world * vec4f(place, 1.0), place, normals[v].xyz, rest[v].xyz);
+    return Corner(scene.clip_from_world * vec4f(place, 1.0), place, normals[v].xyz, rest[v].xyz, places[v].w);
 }
 
 @fragment fn fragment(v: Corner) -> SurfacePoint {
     if height(scene.brain_cut, v.place) > 0.0 { discard; }
     let hit = vec4f(fold(normalize(v.normal)), 0.0, distance(v.place, scene.eye.xyz));
-    return SurfacePoint(packed(hit), packed(vec4f(v.rest, 1.0)));
+    return SurfacePoint(packed(hit), packed(vec4f(v.rest, v.stain)));
 }

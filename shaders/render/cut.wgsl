@@ -23,5 +23,5 @@ struct SurfacePoint {
 
 @fragment fn fragment(v: Vertex) -> SurfacePoint {
     let hit = vec4f(fold(scene.brain_cut.xyz), 1.0, distance(v.place, scene.eye.xyz));
-    return SurfacePoint(packed(hit), packed(vec4f(v.rest, 1.0)));
+    return SurfacePoint(packed(hit), packed(vec4f(v.rest, 0.0)));
 }

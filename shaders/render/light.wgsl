@@ -95,7 +95,15 @@ fn shade_bone(point: vec3f, along: vec3f, skull: vec4f) -> vec3f {
     return lit(colour, normal, along, fract(skull.z), past_tools(point) * floor(skull.z), 0.06 + 0.4 * wet);
 }
 
-fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, rest: vec3f) -> vec3f {
+// Colour of tissue under blood or burnt, and how much of it the blood covers (w).
+fn stained(colour: vec3f, stain: f32) -> vec4f {
+    let film = 1.0 - exp(-max(stain, 0.0) / 0.15);
+    let burnt = mix(colour, vec3f(0.10, 0.07, 0.05), 0.85 * clamp(-stain, 0.0, 1.0));
+    return vec4f(mix(burnt, vec3f(0.36, 0.02, 0.02), film), film);
+}
+
+fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, at_rest: vec4f) -> vec3f {
+    let rest = at_rest.xyz;
     let normal = unfold(brain.xy);
     var key = past_tools(point);
     if brain.z > 0.5 { return painted_brain(cut_colour(rest), rest) * (0.6 + 0.4 * key); }
@@ -105,7 +113,8 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, rest: vec3f) -> vec3f {
         open = openness(g, normal);
         key *= select(1.0, 0.25, shadowed(g, normal, lift()));
     }
-    return lit(painted_brain(brain_colour(rest - 3.5 * normal), rest), normal, along, open, key, 0.20);
+    let colour = stained(painted_brain(brain_colour(rest - 3.5 * normal), rest), at_rest.w);
+    return lit(colour.xyz, normal, along, open, key, 0.20 + 0.3 * colour.w);
 }
 
 fn burr_colour(point: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
@@ -156,7 +165,7 @@ fn seen(at: vec2u) -> vec3f {
     } else if t == near.y {
         colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, scene.tips.y);
     } else if t == brain.w {
-        colour = shade_brain(point, along, brain, unpacked(textureLoad(brain_rest, at, 0)).xyz);
+        colour = shade_brain(point, along, brain, unpacked(textureLoad(brain_rest, at, 0)));
     } else {
         colour = shade_bone(point, along, skull);
     }

@@ -331,7 +331,7 @@ mod tests {
         assert_eq!((wound.coagulated(), wound.account().came[1]), (0, 0), "too far away");
         while wound.worst(positions, ms_of(&wound)).is_some() {
             let at = wound.worst(positions, ms_of(&wound)).unwrap();
-            run(&mut wound, 2.1, Some((at, 1.0, Act::Coagulate)));
+            run(&mut wound, 1.1, Some((at, 1.0, Act::Coagulate)));
         }
         let now = run(&mut wound, 0.1, None);
         let came = wound.account().came;

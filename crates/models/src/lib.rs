@@ -16,6 +16,7 @@ mod error;
 pub mod ingredients;
 pub mod measure;
 pub mod methods;
+pub mod perfusion;
 pub mod solver;
 
 pub use error::ModelError;

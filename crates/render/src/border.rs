@@ -24,6 +24,8 @@ pub(crate) struct Border {
     pub places: Vec<Vec3>,
     /// Current unit normals of boundary nodes.
     pub normals: Vec<Vec3>,
+    /// Blood on boundary nodes, mm; -1 for a burn.
+    pub stains: Vec<f32>,
 }
 
 impl Border {
@@ -34,10 +36,10 @@ impl Border {
         let local = |n: u32| nodes.partition_point(|&m| m < n) as u32;
         let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(local)).collect();
         let places: Vec<Vec3> = nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
-        let normals = vec![Vec3::ZERO; nodes.len()];
+        let (normals, stains) = (vec![Vec3::ZERO; nodes.len()], vec![0.0; nodes.len()]);
         let (rest, now) = (mesh.positions.clone(), mesh.positions.clone());
         let (tets, all) = (mesh.tets.clone(), mesh.tets.clone());
-        Self { nodes, triangles, tets, all, gone: Vec::new(), rest, now, places, normals }
+        Self { nodes, triangles, tets, all, gone: Vec::new(), rest, now, places, normals, stains }
     }
 
     /// Shows the mesh without the tetrahedra that are `gone`, or all of it; returns whether that
@@ -65,6 +67,13 @@ impl Border {
         self.places.iter_mut().zip(&self.nodes).for_each(|(place, &n)| *place = positions[n as usize]);
         smooth_normals(&self.places, &self.triangles, &mut self.normals);
         Ok(())
+    }
+
+    /// Takes the stain of each node, as in a frame.
+    pub fn stain(&mut self, stains: Option<&[u8]>) {
+        let mm = |stain: u8| if stain == u8::MAX { -1.0 } else { 0.01 * f32::from(stain) };
+        let of = |node: u32| stains.and_then(|all| all.get(node as usize)).map_or(0.0, |stain| mm(*stain));
+        self.stains.iter_mut().zip(&self.nodes).for_each(|(stain, &node)| *stain = of(node));
     }
 
     /// Rest position of a boundary node, world mm.

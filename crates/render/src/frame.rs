@@ -61,6 +61,9 @@ pub struct Frame<'a> {
     /// Whether each tetrahedron of the brain was resected; `None` for none of them. The walls of
     /// the hole are drawn with the MRI on them.
     pub brain_gone: Option<&'a [bool]>,
+    /// Stain of each node of the brain: blood of 0 to 2 mm as 0 to 200, 255 for a burn; `None` for
+    /// none.
+    pub brain_stains: Option<&'a [u8]>,
     /// Whether the skull is shown in the 3-D view.
     pub show_bone: bool,
     /// Whether the brain is shown in the 3-D view.
@@ -132,6 +135,7 @@ impl Frame<'_> {
             drilling: false,
             brain_positions: None,
             brain_gone: None,
+            brain_stains: None,
             show_bone: true,
             show_brain: true,
             bone_paint: None,

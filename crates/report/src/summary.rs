@@ -11,6 +11,7 @@ use trepan_contact::GuardCounters;
 use trepan_patient::Plan;
 use trepan_patient::PlanComparison;
 use trepan_runtime::{Outcome, Quantiles, Replayed, SolverOutcome};
+use trepan_stages::Bleeding;
 use trepan_stages::alarms::REAL_TIME;
 use trepan_stages::by_cause;
 use trepan_stages::notice::{Notice, What};
@@ -70,6 +71,8 @@ pub struct Summary {
     pub bone_removed_mm3: f64,
     /// What an aspirator took; `null` if nothing.
     pub resection: Option<Resection>,
+    /// How the wound bled; `null` if it did not.
+    pub bleeding: Option<Bleeding>,
     /// Voxels of `removed-label.nii.gz`; `null` without bone.
     pub removed_label: Option<RemovedLabel>,
     /// Pieces of bone cut off the skull, such as a flap, at the end.
@@ -321,6 +324,7 @@ impl Summary {
             },
             hand_force_scale: outcome.force_scale,
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
+            bleeding: outcome.solver.as_ref().and_then(|s| s.bleeding.clone()).filter(|b| b.bled_ml > 0.0),
             cut_off: self.cut_off.with_lifted(&outcome.written.notices),
             warnings: warnings(outcome),
             scores: outcome.scores,

@@ -61,10 +61,10 @@ pub fn run(
     let shots = film.is_some().then_some(shots);
     let mut film = film;
     let soft = stages.tissue.is_some().then_some(cells.shown.1);
-    let inputs = RenderInputs { view: cells.view.1, soft, film: shots };
+    let inputs = RenderInputs { view: cells.view.1, soft, bleeding: Some(cells.bleeding.1), film: shots };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
-        let (mut view, mut shown) = (cells.view.0, cells.shown.0);
+        let (mut view, mut shown, mut bleeding) = (cells.view.0, cells.shown.0, cells.bleeding.0);
         let replaying = scope.spawn(move || {
             let mut replay = Replay::new(stages, recording, senders, start);
             let ticks = up_to(recording, end_ms);
@@ -82,6 +82,9 @@ pub fn run(
                 film.take_if(|_| shot.is_some_and(|shot| sender.send(shot).is_err()));
                 if let Some(tissue) = replay.tissue.as_ref().filter(|_| film.is_none()) {
                     shown.write(|frame| tissue.solver.publish(frame));
+                    if let Some(now) = tissue.collision.bleeds() {
+                        bleeding.write(|bleeding| bleeding.clone_from(now));
+                    }
                 }
             }
             if film.is_none() {
@@ -295,6 +298,7 @@ impl<'a> Replay<'a> {
         let solver = self.tissue.as_ref().map(|tissue| SolverOutcome {
             times: self.step_times,
             collision_times: self.collision_times,
+            bleeding: tissue.collision.bleeds().cloned(),
             real_time_factor: last.map_or(0.0, |t| tissue.solver.time_ms() / t.time_ms.max(1e-3)),
             ..SolverOutcome::of(&tissue.solver)
         });

@@ -28,7 +28,7 @@ use trepan_soft::Loads;
 use trepan_stages::alarms;
 use trepan_stages::haptic_tick::{HapticStage, Tick, TickInput};
 use trepan_stages::second_hand::{SecondHand, SecondView};
-use trepan_stages::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
+use trepan_stages::{Bleeding, CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 
 /// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;
@@ -77,7 +77,13 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
 }
 
 /// The collision loop: collides the newest tool with the newest brain at its own rate.
-fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clock, pace: Pace, stop: &Stop) -> Times {
+fn collision_loop(
+    mut stage: CollisionStage,
+    mut ends: CollisionEnds,
+    clock: Clock,
+    pace: Pace,
+    stop: &Stop,
+) -> (Times, Option<Bleeding>) {
     let _ = real_time(60, "collision");
     let mut times = Times::default();
     let mut schedule = Schedule::new(pace.collision_ms.into(), clock.now_ms());
@@ -93,13 +99,16 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
             loads.contacts.copy_from(&stage.loads().contacts);
             loads.fills.clone_from(&stage.loads().fills);
         });
+        if let Some(now) = stage.bleeds() {
+            ends.bleeding.write(|bleeding| bleeding.clone_from(now));
+        }
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;
         times.add_us(record.compute_us);
         ends.records.send(record);
         schedule.advance(done_ms);
     }
-    times
+    (times, stage.bleeds().cloned())
 }
 
 /// The solver loop: simulated time follows wall time; a lag over [`LAG_MS`] is skipped. After two
@@ -157,7 +166,12 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
     let second = second.map(|(stage, owner)| Second { stage, owner, records: seconds });
     let hands = Hands { stage: haptic, owner, second };
     let simulating = tissue.is_some();
-    let inputs = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
+    let inputs = RenderInputs {
+        view: cells.view.1,
+        soft: tissue.is_some().then_some(cells.shown.1),
+        bleeding: Some(cells.bleeding.1),
+        film: None,
+    };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
         let (tool, view, patch) = (cells.tool.0, cells.view.0, cells.patch.1);
@@ -167,7 +181,8 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
         let feeling = scope.spawn(move || haptic_loop(hands, ends, clock, pace, stop));
         let solving = tissue.map(|tissue| {
             let (tool, soft, patch, loads) = (cells.tool.1, cells.soft.1, cells.patch.0, cells.loads.0);
-            let ends = CollisionEnds { tool, soft, patch, loads, records: collisions };
+            let bleeding = cells.bleeding.0;
+            let ends = CollisionEnds { tool, soft, patch, loads, bleeding, records: collisions };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
             let (soft, shown, filmed) = (cells.soft.0, cells.shown.0, cells.filmed_soft.0);
             let ends = SolverEnds { loads: cells.loads.1, soft, shown, filmed, records: solver };
@@ -180,7 +195,8 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
         outcome.remarks.extend(filming.and_then(|filming| filming.join().ok().flatten()));
         let solver = solving.map(|(colliding, solving)| {
             let solver = solving.join().unwrap_or_default();
-            SolverOutcome { collision_times: colliding.join().unwrap_or_default(), ..solver }
+            let (collision_times, bleeding) = colliding.join().unwrap_or_default();
+            SolverOutcome { collision_times, bleeding, ..solver }
         });
         Outcome { solver, written: writing.join().unwrap_or_default(), ..outcome }
     })
@@ -287,6 +303,7 @@ struct CollisionEnds {
     soft: Reader<SoftFrame>,
     patch: Writer<Numbered<SurfacePatch>>,
     loads: Writer<Numbered<Loads>>,
+    bleeding: Writer<Bleeding>,
     records: Sender<CollisionRecord>,
 }
 

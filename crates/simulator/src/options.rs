@@ -18,6 +18,8 @@ use trepan_stages::program::Program;
 pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
 /// Numerical range of `--aspiration`, mm/s.
 pub(crate) const ASPIRATIONS_MM_S: [f64; 2] = [0.0, 50.0];
+/// Numerical range of `--bleeding`.
+pub(crate) const BLEEDINGS: [f64; 2] = [0.0, 20.0];
 /// Numerical range of `--csf-speed-up`.
 pub(crate) const CSF_SPEED_UPS: [f64; 2] = [1.0, 1000.0];
 /// Numerical range of `--rate-hz`.
@@ -159,6 +161,10 @@ pub struct Options {
     /// uncalibrated; a replay's as recorded]
     #[arg(help_heading = "Models and accuracy", long, value_name = "MM/S", allow_negative_numbers = true)]
     pub aspiration: Option<f32>,
+    /// How much cut tissue bleeds, over the usual; 0 for none [default: 1, uncalibrated; a replay's
+    /// as recorded]
+    #[arg(help_heading = "Models and accuracy", long, value_name = "FACTOR", allow_negative_numbers = true)]
+    pub bleeding: Option<f32>,
     /// Tissue classes (as for --tissue) that raise a warning when a tool comes close, separated by
     /// commas [default: vessel]
     #[arg(help_heading = "Session", long, value_name = "CLASS,...", value_delimiter = ',')]
@@ -561,6 +567,7 @@ impl Options {
         within("csf-speed-up", self.csf_speed_up.unwrap_or(1.0).into(), CSF_SPEED_UPS[0], CSF_SPEED_UPS[1])?;
         within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;
         within("aspiration", self.aspiration.unwrap_or(0.0).into(), ASPIRATIONS_MM_S[0], ASPIRATIONS_MM_S[1])?;
+        within("bleeding", self.bleeding.unwrap_or(0.0).into(), BLEEDINGS[0], BLEEDINGS[1])?;
         rate(self.rate_hz.map_or(RATES_HZ[0], f64::from))?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }

@@ -14,6 +14,7 @@ use trepan_measurements::{aspirator, shift, support};
 use trepan_mesh::TetMesh;
 use trepan_models::ingredients::{Ingredients, SolverDevice, Support};
 use trepan_models::methods;
+use trepan_models::perfusion::perfusion;
 use trepan_models::solver::{self, SolverInfo};
 use trepan_patient::Case;
 use trepan_patient::Plan;
@@ -238,6 +239,10 @@ impl SessionSetup {
             return Ok(Tissue { collision, solver });
         }
         let collision = collision.aspirating(&brain.mesh, &rates).map_err(|fault| brain_error(&fault))?;
+        let collision = match self.operation.bleeding > 0.0 {
+            true => collision.bleeding(&brain.mesh, &perfusion(brain, self.operation.bleeding), -self.plan.site.inward),
+            false => collision,
+        };
         Ok(Tissue { collision, solver: solver.resectable(rates.len()) })
     }
 

@@ -9,10 +9,12 @@
 //! give the same results.
 
 use crate::aspirator::Aspirator;
+use crate::bleeding::{Bleeder, Bleeding};
 use crate::haptic_tick::ToolSample;
 use crate::program::{Phase, Program};
 use crate::settling::Settling;
 use crate::skull_wall::SkullWall;
+use trepan_bleeding::Perfusion;
 use trepan_contact::{MAX_SPRINGS, NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, MeshCollision, NodeContact, TissueCollision, TissueStep};
 use trepan_geometry::{Tool, Vec3};
@@ -28,7 +30,7 @@ impl CollisionStage {
         if !self.with_torque {
             self.patch.couple_mm = Vec3::ZERO;
         }
-        self.aspirate(sample);
+        self.aspirate(sample, soft);
         self.settling.load(sample.phase(), sample.state.time_ms, &mut self.loads);
         self.press(sample.phase(), soft);
         self.seq += 1;
@@ -43,11 +45,15 @@ impl CollisionStage {
     }
 
     /// Takes tissue away that an aspirator touches; contact feels that from the next step on.
-    fn aspirate(&mut self, sample: &ToolSample) {
+    fn aspirate(&mut self, sample: &ToolSample, soft: &SoftFrame) {
         let Some(aspirator) = &mut self.aspirator else { return };
         aspirator.step(sample, &self.tools[sample.slot], &mut self.loads.fills);
         for tool in &mut self.tools {
             aspirator.thinned.iter().for_each(|&tet| tool.thin(tet, self.loads.fills[tet as usize]));
+        }
+        if let Some(bleeder) = &mut self.bleeder {
+            let gone = aspirator.thinned.iter().copied().filter(|&tet| self.loads.fills[tet as usize] == 0);
+            bleeder.step(sample, &soft.positions, gone);
         }
     }
 
@@ -113,6 +119,7 @@ pub struct CollisionStage {
     under_pressure: bool,
     settling: Settling,
     aspirator: Option<Aspirator>,
+    bleeder: Option<Bleeder>,
     patch: SurfacePatch,
     loads: Loads,
     step: TissueStep,
@@ -150,6 +157,7 @@ impl CollisionStage {
             patch: SurfacePatch::default(),
             settling: Settling::default(),
             aspirator: None,
+            bleeder: None,
             loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
             step: TissueStep::default(),
             seq: 0,
@@ -189,6 +197,17 @@ impl CollisionStage {
         let tools = self.tools.into_iter().map(|tool| tool.resectable(mesh, may_go)).collect::<Result<_, _>>()?;
         let loads = Loads { fills: vec![u16::MAX; mesh.tets.len()], ..self.loads };
         Ok(Self { tools, loads, aspirator: Some(Aspirator::of(mesh, rates)), ..self })
+    }
+
+    /// Lets what is aspirated bleed, by the perfusion of each tetrahedron; `up` is the unit vector
+    /// against gravity. Without an aspirator nothing bleeds.
+    pub fn bleeding(self, mesh: &TetMesh, perfusion: &[Perfusion], up: Vec3) -> Self {
+        Self { bleeder: Some(Bleeder::of(mesh, perfusion, up)), ..self }
+    }
+
+    /// How the wound bleeds; `None` where nothing can.
+    pub fn bleeds(&self) -> Option<&Bleeding> {
+        self.bleeder.as_ref().map(|bleeder| &bleeder.now)
     }
 
     /// Volume that was aspirated so far, mm³.
@@ -296,7 +315,7 @@ mod tests {
             step: 1,
             time_ms: 1.0,
             positions,
-            fills: Vec::new(),
+            ..SoftFrame::default()
         };
         let open = |folds: bool| {
             let stage = CollisionStage::new(Program::Brain, &mesh, &Config::default(), None).unwrap();

@@ -24,6 +24,7 @@
 pub mod ahead;
 pub mod alarms;
 mod aspirator;
+mod bleeding;
 pub mod collision_step;
 mod drill;
 mod fault;
@@ -43,6 +44,7 @@ mod tray;
 mod undo;
 
 pub use alarms::Limits;
+pub use bleeding::Bleeding;
 pub use collision_step::{CollisionStage, SoftFrame};
 pub use haptic_config::{BoneModels, HapticConfig};
 pub use haptic_tick::{HapticStage, TickInput, ToolSample};

@@ -178,8 +178,8 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
         }
         "resect" => {
             let (start, moves) = opened(site, plan);
-            let resection = resect(site, plan).into_iter().filter(|_| plan.presses_after_flap);
-            (start, upright, moves.into_iter().chain(resection).collect())
+            let at_brain = resect(site, plan).into_iter().chain(coagulate(site, plan));
+            (start, upright, moves.into_iter().chain(at_brain.filter(|_| plan.presses_after_flap)).collect())
         }
         "craniotomy" => (start, upright, craniotomy(site, plan)),
         "probe" => (start, upright, probe(site, plan)),
@@ -193,7 +193,7 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
     let whole: f64 = moves.iter().map(|m| m.1).sum();
     let mut path = Path::from(start, rotation);
     for Move(label, share, tip, buttons) in moves {
-        if buttons.taken() == Some(ToolKind::Aspirator) {
+        if matches!(buttons.taken(), Some(ToolKind::Aspirator | ToolKind::Bipolar)) {
             path.through(site.entry);
         }
         path.to(label, duration_ms * share / whole, tip, buttons);
@@ -290,43 +290,77 @@ const LAYER_MM: f32 = 1.5;
 /// Corners of a circle.
 const CORNERS: u8 = 12;
 
-/// Takes the target away with the aspirator, layer by layer from above, each from the middle. The
-/// target may lie anywhere between its place at rest and where it sinks to.
-fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
-    let tip_mm = plan.aspirator_radius_mm;
-    let usual = Target { centre: site.below(site.brain_mm + 2.0), radius_mm: 5.0, sinks_mm: 0.0 };
-    let Target { centre, radius_mm, sinks_mm } = plan.target.unwrap_or(usual);
+/// Layers of the target as its ball shrunk by some mm, from above: where each has its middle and
+/// how wide it is. The target may lie anywhere between its place at rest and where it sinks to.
+fn layers(site: &Site, target: &Target, reach_mm: f32, layer_mm: f32) -> impl Iterator<Item = (Vec3, f32)> {
+    let Target { centre, sinks_mm, .. } = *target;
+    let (inward, long_mm) = (site.inward, 2.0 * reach_mm + sinks_mm);
+    let layers = (long_mm / layer_mm).ceil().max(1.0) as u8;
+    (0..=layers).map(move |layer| {
+        let below_mm = long_mm * f32::from(layer) / f32::from(layers) - reach_mm;
+        let from_middle_mm = below_mm.min(0.0) + (below_mm - sinks_mm).max(0.0);
+        (centre + below_mm * inward, (reach_mm * reach_mm - from_middle_mm * from_middle_mm).max(0.0).sqrt())
+    })
+}
+
+/// Corners of a circle across the approach.
+fn corners(site: &Site, middle: Vec3, radius_mm: f32) -> impl Iterator<Item = Vec3> {
     let turn = Quat::from_rotation_arc(Vec3::NEG_Z, site.inward.normalize());
-    let reach_mm = (radius_mm - tip_mm).max(0.0);
-    let top = centre - site.inward * ((centre - site.entry).dot(site.inward) - site.brain_mm + tip_mm + 1.0);
+    (0..=CORNERS).map(move |corner| {
+        let (sin, cos) = (f32::from(corner) / f32::from(CORNERS) * std::f32::consts::TAU).sin_cos();
+        middle + turn * (radius_mm * Vec3::new(cos, sin, 0.0))
+    })
+}
+
+/// What is resected, and a place above it in the opening.
+fn target(site: &Site, plan: &Plan) -> (Target, Vec3) {
+    let usual = Target { centre: site.below(site.brain_mm + 2.0), radius_mm: 5.0, sinks_mm: 0.0 };
+    let target = plan.target.unwrap_or(usual);
+    let deep_mm = (target.centre - site.entry).dot(site.inward);
+    (target, target.centre - site.inward * (deep_mm - site.brain_mm + plan.aspirator_radius_mm + 1.0))
+}
+
+/// Takes the target away with the aspirator, layer by layer from above, each from the middle.
+fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
+    let (target, top) = target(site, plan);
     let away = site.below(-plan.away_mm);
     let mut moves = vec![
         Move("take the aspirator", 1.5, away, Buttons::take(ToolKind::Aspirator)),
         Move("come to the brain", 6.0, top, HANDS_OFF),
     ];
-    let mut aspirate = |tip: Vec3, mm: f32| {
-        moves.push(Move("aspirate", ASPIRATING_SHARE * f64::from(mm.max(0.2)), tip, Buttons::PEDAL));
-    };
     let mut last = top;
-    let long_mm = 2.0 * reach_mm + sinks_mm;
-    let layers = (long_mm / LAYER_MM).ceil().max(1.0) as u8;
-    for layer in 0..=layers {
-        let below_mm = long_mm * f32::from(layer) / f32::from(layers) - reach_mm;
-        let from_middle_mm = below_mm.min(0.0) + (below_mm - sinks_mm).max(0.0);
-        let wide_mm = (reach_mm * reach_mm - from_middle_mm * from_middle_mm).max(0.0).sqrt();
-        let middle = centre + below_mm * site.inward;
+    for (middle, wide_mm) in layers(site, &target, (target.radius_mm - plan.aspirator_radius_mm).max(0.0), LAYER_MM) {
         let circles = (wide_mm / LAYER_MM).ceil() as u8;
-        let corners = (1..=circles).flat_map(|circle| {
-            let radius_mm = wide_mm * f32::from(circle) / f32::from(circles);
-            (0..=CORNERS).map(move |corner| {
-                let (sin, cos) = (f32::from(corner) / f32::from(CORNERS) * std::f32::consts::TAU).sin_cos();
-                middle + turn * (radius_mm * Vec3::new(cos, sin, 0.0))
-            })
-        });
-        for tip in [middle].into_iter().chain(corners) {
-            aspirate(tip, tip.distance(last));
+        let radius = |circle: u8| wide_mm * f32::from(circle) / f32::from(circles);
+        for tip in [middle].into_iter().chain((1..=circles).flat_map(|c| corners(site, middle, radius(c)))) {
+            let share = ASPIRATING_SHARE * f64::from(tip.distance(last).max(0.2));
+            moves.push(Move("aspirate", share, tip, Buttons::PEDAL));
             last = tip;
         }
+    }
+    moves.extend([Move("draw back", 4.0, top, HANDS_OFF), Move("leave", 4.0, away, HANDS_OFF)]);
+    moves
+}
+
+/// Share of the time for a millimetre of the bipolar's way, numerical: some 3 mm/s.
+const COAGULATING_SHARE: f64 = 0.65;
+/// Distance between the circles of the bipolar, mm: less than twice its reach.
+const COAGULATED_MM: f32 = 2.5;
+
+/// Goes around the wall of what was taken away with the bipolar, from above, and over its ground.
+fn coagulate(site: &Site, plan: &Plan) -> Vec<Move> {
+    let (target, top) = target(site, plan);
+    let away = site.below(-plan.away_mm);
+    let mut moves = vec![
+        Move("take the bipolar", 1.5, away, Buttons::take(ToolKind::Bipolar)),
+        Move("come to the wound", 6.0, top, HANDS_OFF),
+    ];
+    let mut last = top;
+    let wall = layers(site, &target, target.radius_mm, COAGULATED_MM);
+    for tip in wall.flat_map(|(middle, wide_mm)| corners(site, middle, wide_mm)) {
+        let share = COAGULATING_SHARE * f64::from(tip.distance(last).max(0.2));
+        moves.push(Move("coagulate", share, tip, Buttons::PEDAL));
+        last = tip;
     }
     moves.extend([Move("draw back", 4.0, top, HANDS_OFF), Move("leave", 4.0, away, HANDS_OFF)]);
     moves

@@ -39,7 +39,7 @@ impl Path {
 
     /// From now on, aims the shaft at a point from below it; far above, it is upright.
     pub(super) fn through(&mut self, keyhole: Vec3) {
-        self.keyhole = Some((keyhole, self.end_ms()));
+        self.keyhole = self.keyhole.or(Some((keyhole, self.end_ms())));
     }
 
     /// The tool's rotation with its tip at a place.

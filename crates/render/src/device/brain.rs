@@ -70,13 +70,16 @@ impl Brain {
         gpu: &Gpu,
         positions: Option<&[Vec3]>,
         gone: Option<&[bool]>,
+        stains: Option<&[u8]>,
     ) -> Result<bool, RenderError> {
         let is_other = self.border.leave_out(gone);
         if is_other {
             self.device = Device::of(gpu, &self.border)?;
         }
         self.border.follow(positions)?;
-        self.device.places.write(gpu, 0, &wide(&self.border.places));
+        self.border.stain(stains);
+        let places = self.border.places.iter().zip(&self.border.stains).map(|(place, stain)| place.extend(*stain));
+        self.device.places.write(gpu, 0, &places.collect::<Vec<_>>());
         self.device.normals.write(gpu, 0, &wide(&self.border.normals));
         Ok(is_other)
     }

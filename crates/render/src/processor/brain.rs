@@ -27,9 +27,12 @@ pub(crate) struct Fragment {
     pub rest: Vec3,
     /// Whether this is the cut surface.
     pub cut: bool,
+    /// Blood, mm; towards -1 a burn.
+    pub stain: f32,
 }
 
-const NONE: Fragment = Fragment { depth: f32::INFINITY, t: NOTHING, normal: Vec3::Z, rest: Vec3::ZERO, cut: false };
+const NONE: Fragment =
+    Fragment { depth: f32::INFINITY, t: NOTHING, normal: Vec3::Z, rest: Vec3::ZERO, cut: false, stain: 0.0 };
 
 impl Fragments {
     pub fn of(width: usize, height: usize) -> Self {
@@ -48,7 +51,8 @@ impl Fragments {
         let Some(border) = border else { return };
         let vertex = |n: u32| {
             let place = border.places[n as usize];
-            Vertex { normal: border.normals[n as usize], rest: border.at_rest(n), ..Vertex::seen(view, place) }
+            let (normal, stain) = (border.normals[n as usize], border.stains[n as usize]);
+            Vertex { normal, stain, rest: border.at_rest(n), ..Vertex::seen(view, place) }
         };
         let vertices: Vec<Vertex> = (0..border.places.len() as u32).map(vertex).collect();
         for corners in &border.triangles {
@@ -95,7 +99,8 @@ impl Fragments {
                 if under.is_none_or(|plane| height(plane, place) <= 0.0) {
                     let normal = mean(|v| v.normal).normalize_or(Vec3::Z);
                     let (t, rest) = (place.distance(eye), mean(|v| v.rest));
-                    *fragment = Fragment { depth, t, normal, rest, cut: under.is_none() };
+                    let stain = (0..3).map(|n| over[n] * depth * corners[n].stain).sum();
+                    *fragment = Fragment { depth, t, normal, rest, cut: under.is_none(), stain };
                 }
             }
         }
@@ -111,12 +116,14 @@ struct Vertex {
     place: Vec3,
     normal: Vec3,
     rest: Vec3,
+    stain: f32,
 }
 
 impl Vertex {
     /// Projects a point into the view.
     fn seen(view: &View, place: Vec3) -> Self {
         let (at, depth) = view.project(place);
-        Self { at: Vec2::new(at.x, -at.y) * 0.5 + 0.5, depth, place, normal: Vec3::ZERO, rest: Vec3::ZERO }
+        let at = Vec2::new(at.x, -at.y) * 0.5 + 0.5;
+        Self { at, depth, place, normal: Vec3::ZERO, rest: Vec3::ZERO, stain: 0.0 }
     }
 }

@@ -96,7 +96,15 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
         }
     }
     let colour = painted(brain_colour(inputs.mri, brain.rest - 3.5 * brain.normal));
-    lit(scene, colour, brain.normal, along, open, key, 0.20)
+    let (colour, film) = stained(colour, brain.stain);
+    lit(scene, colour, brain.normal, along, open, key, 0.20 + 0.3 * film)
+}
+
+/// Colour of tissue under blood or burnt, and how much of it the blood covers.
+fn stained(colour: Vec3, stain: f32) -> (Vec3, f32) {
+    let film = 1.0 - (-stain.max(0.0) / 0.15).exp();
+    let burnt = colour.lerp(Vec3::new(0.10, 0.07, 0.05), 0.85 * (-stain).clamp(0.0, 1.0));
+    (burnt.lerp(Vec3::new(0.36, 0.02, 0.02), film), film)
 }
 
 pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {

@@ -166,6 +166,7 @@ impl ProcessorRenderer {
         if let Some(brain) = &mut self.brain {
             brain.leave_out(frame.brain_gone);
             brain.follow(frame.brain_positions)?;
+            brain.stain(frame.brain_stains);
         }
         let (items, lines_left) = items(&frame.overlay, self.view(frame).eye);
         let mri_from_world = self.mri.as_ref().map(|m| m.texture_from_world);

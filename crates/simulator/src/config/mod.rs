@@ -11,7 +11,7 @@ mod old_header;
 use crate::device_limits::DeviceLimits;
 use crate::error::SessionError;
 use crate::operation::Operation;
-use crate::options::{ASPIRATIONS_MM_S, CSF_SPEED_UPS, MODULI_KPA, RATES_HZ};
+use crate::options::{ASPIRATIONS_MM_S, BLEEDINGS, CSF_SPEED_UPS, MODULI_KPA, RATES_HZ};
 use serde::{Deserialize, Serialize};
 use serde_json::{Number, Value};
 use std::borrow::Cow;
@@ -78,6 +78,7 @@ impl SessionConfig {
             ("operation.csf_speed_up", self.operation.csf_speed_up, CSF_SPEED_UPS.map(of_flags)),
             ("operation.young_modulus_kpa", self.operation.young_modulus_kpa, MODULI_KPA.map(of_flags)),
             ("operation.aspiration_mm_s", self.operation.aspiration_mm_s, ASPIRATIONS_MM_S.map(of_flags)),
+            ("operation.bleeding", self.operation.bleeding, BLEEDINGS.map(of_flags)),
             ("operation.rate_hz", self.operation.rate_hz, RATES_HZ.map(of_flags)),
             ("sizes.spacing_mm", spacing_mm.map_or(1.0, of_flags), [0.2, 4.0]),
             ("sizes.halvings", halvings.unwrap_or(0) as f32, [0.0, 4.0]),

@@ -15,6 +15,7 @@ use trepan_report::summary::MovingSummary;
 use trepan_runtime::clock::Clock;
 use trepan_runtime::stop::Stop;
 use trepan_runtime::{RenderInputs, Times, View};
+use trepan_stages::Bleeding;
 use trepan_stages::collision_step::SoftFrame;
 use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;
@@ -90,9 +91,17 @@ pub(crate) struct Shape {
     /// What is left of its tetrahedra, of 65535, and which are gone; empty where none can go.
     pub fills: Vec<u16>,
     pub gone: Vec<bool>,
+    /// How its wound bleeds.
+    pub bleeding: Bleeding,
 }
 
 impl Shape {
+    /// Takes what solver and collision published.
+    pub fn follow(&mut self, inputs: &mut RenderInputs) {
+        inputs.soft.iter_mut().for_each(|soft| self.take(soft.latest().0));
+        inputs.bleeding.iter_mut().for_each(|bleeding| self.bleeding.clone_from(bleeding.latest().0));
+    }
+
     /// Takes what the solver published.
     pub fn take(&mut self, soft: &SoftFrame) {
         self.positions.clone_from(&soft.positions);
@@ -146,6 +155,7 @@ pub(crate) fn frame<'a>(
         overlay: Overlay { force: arrow(view), ..Overlay::default() },
         brain_positions: Some(&brain.positions[..]).filter(|positions| !positions.is_empty()),
         brain_gone: Some(&brain.gone[..]).filter(|gone| !gone.is_empty()),
+        brain_stains: Some(&brain.bleeding.stains[..]).filter(|stains| !stains.is_empty()),
         show_bone: bone_shown,
         slices: SliceLook { half_height_mm: Some(SLICE_MM), ..SliceLook::default() },
         ..Frame::of(camera)
@@ -184,7 +194,7 @@ pub(crate) fn draw(
         let over = view.finished || stop.asked();
         if over || clock.now_ms() >= next_ms {
             next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
-            inputs.soft.iter_mut().for_each(|soft| brain.take(soft.latest().0));
+            brain.follow(&mut inputs);
             let path = folder.join(format!("frame-{:05}.png", album.frames));
             let drawn = painter.picture(&frame(camera, &view, &brain, bone_shown, &colours));
             match drawn.map_err(SessionError::from).and_then(|(image, _)| write(&image, &path)) {

@@ -24,6 +24,7 @@ use trepan_runtime::lesson::{TEACHER_REQUESTS, Teacher};
 use trepan_runtime::stop::Stop;
 use trepan_runtime::watch::{PeerSession, Watching};
 use trepan_runtime::{RenderInputs, View};
+use trepan_stages::Bleeding;
 use trepan_stages::notice::Notice;
 use trepan_stages::program::Program;
 use trepan_window::{self as window, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
@@ -106,6 +107,10 @@ impl ViewState {
         let taken_ml = self.taken_ml(brain);
         if taken_ml > 0.0 || view.sample.tool.kind == ToolKind::Aspirator {
             panel.task.push(("tissue taken".into(), format!("{taken_ml:.2} ml")));
+        }
+        let Bleeding { bled_ml, rate_ml_per_min, .. } = brain.bleeding;
+        if bled_ml > 0.0 {
+            panel.task.push(("blood lost".into(), format!("{bled_ml:.1} ml, {rate_ml_per_min:.1} ml/min")));
         }
         if !by_hand {
             let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
@@ -301,9 +306,7 @@ fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) 
 impl window::Session for Show {
     fn update(&mut self, input: &WindowInput) -> Panel {
         self.view = *self.inputs.view.latest().0;
-        if let Some(soft) = &mut self.inputs.soft {
-            self.brain.take(soft.latest().0);
-        }
+        self.brain.follow(&mut self.inputs);
         self.requests.settle(self.view.sample.slot);
         self.raycast.follow(&self.brain, self.view.sample.state.tip());
         self.send_pose(input);
@@ -488,7 +491,7 @@ mod tests {
         let (mut writer, view) = cell(View::at(sample, 1.0));
         let mut show = Show {
             view: View::at(sample, 1.0),
-            inputs: RenderInputs { view, soft: None, film: None },
+            inputs: RenderInputs { view, soft: None, bleeding: None, film: None },
             brain: Shape::default(),
             shown: ViewState {
                 case: "case".into(),

@@ -18,7 +18,7 @@ use trepan_stages::{Phase, Program, SoftFrame, TickInput};
 use trepan_trials_scenes::case;
 
 /// Length of the operation, bone included, ms.
-const END_MS: u64 = 240_000;
+const END_MS: u64 = 350_000;
 /// Ingredients of the quality `auto`.
 const INGREDIENTS: &str = "element=locking-free,law=stiffening,pia-arachnoid=on,relaxation=solid-and-fluid,friction=0.1,\
                            support=anchored";
@@ -65,6 +65,8 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
     let fills = tissue.solver.fills();
     let (whole, left) = (brain.left_mm3(&vec![u16::MAX; fills.len()]), brain.left_mm3(fills));
     let taken = |at: usize| whole[at] - left[at];
+    let bleeding = tissue.collision.bleeds().context("the wound bleeds")?;
+    let unaccounted = (bleeding.bled_ml - bleeding.sucked_ml - bleeding.lies_ml).abs() / bleeding.bled_ml;
     let (all_mm3, tumour) = (whole.iter().sum::<f64>(), TissueClass::Tumour as usize);
     let gone_mm3 = (0..whole.len()).map(taken).sum::<f64>();
     let share = taken(tumour) / whole[tumour];
@@ -77,6 +79,9 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
             .metric("healthy_mm3", gone_mm3 - taken(tumour))
             .metric("tetrahedra_gone", fills.iter().filter(|fill| **fill == 0).count() as f64)
             .metric("most_n", most_n.into())
+            .metric("bled_ml", bleeding.bled_ml)
+            .metric("worst_ml_per_min", bleeding.worst_ml_per_min.into())
+            .metric("sources_closed", bleeding.coagulated.into())
             .metric("inverted", faults.inverted as f64),
     );
     let put_right = (faults.inverted + faults.limited + faults.non_finite) as f64 + faults.skipped_ms;
@@ -84,6 +89,8 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
         Gate::at_least(format!("{name}: share of the tumour taken"), share, 0.8),
         Gate::at_most(format!("{name}: volume not accounted for, of the brain"), lost, 1e-6),
         Gate::at_most(format!("{name}: elements, nodes and ms that the solver put right"), put_right, 0.0),
+        Gate::at_most(format!("{name}: blood not accounted for"), unaccounted, 1e-3),
+        Gate::at_most(format!("{name}: bleeding at the end, ml/min"), bleeding.rate_ml_per_min.into(), 1.0),
         Gate::at_most(format!("{name}: largest change of force in a tick, N"), most_step_n.into(), 0.05),
     ]);
     Ok(())
