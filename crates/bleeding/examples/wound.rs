@@ -22,7 +22,7 @@ fn block() -> TetMesh {
 
 fn main() {
     let mesh = block();
-    let perfusion = |tet: usize| Perfusion { capillaries: 1.0, has_vessel: tet.is_multiple_of(150) };
+    let perfusion = |tet: usize| Perfusion { capillaries: 1.0, vessel: f32::from(tet.is_multiple_of(150)) };
     let mut wound = Wound::of(&mesh, &(0..mesh.tets.len()).map(perfusion).collect::<Vec<_>>());
     let top = Vec3::new(16.0, 16.0, 32.0);
     let centre = |tet: usize| mesh.corners(tet).into_iter().sum::<Vec3>() / 4.0;

@@ -22,8 +22,8 @@ const STAIN: (f32, f32) = (2.0, 200.0);
 pub struct Perfusion {
     /// Its capillaries, over those of brain; 0 where nothing bleeds.
     pub capillaries: f32,
-    /// Whether a vessel is cut where it comes to light.
-    pub has_vessel: bool,
+    /// A vessel that is cut where it comes to light, over the usual one; 0 for none.
+    pub vessel: f32,
 }
 
 /// What a tool does, with its tip as a ball.
@@ -112,7 +112,7 @@ impl Wound {
     }
 
     fn bleed(&mut self, face: u32, positions: &[Vec3], now_ms: f64) {
-        let Perfusion { capillaries, has_vessel } = self.perfusion[face as usize / 4];
+        let Perfusion { capillaries, vessel } = self.perfusion[face as usize / 4];
         let [a, b, c] = self.border.nodes(face).map(|node| positions[node as usize]);
         let area_mm2 = 0.5 * (b - a).cross(c - a).length();
         let of_area = capillaries * bleeding::CAPILLARY_RATE.f32() * 1e-2 * area_mm2;
@@ -123,11 +123,9 @@ impl Wound {
             }
         };
         open(of_area, bleeding::CAPILLARY_TIME.value);
-        if has_vessel {
-            open(bleeding::VESSEL_RATE.f32(), bleeding::VESSEL_TIME.value);
-            // It is cut once.
-            self.perfusion[face as usize / 4].has_vessel = false;
-        }
+        open(vessel * bleeding::VESSEL_RATE.f32(), bleeding::VESSEL_TIME.value);
+        // It is cut once.
+        self.perfusion[face as usize / 4].vessel = 0.0;
     }
 
     /// Goes on to a time: a tenth of a turn in which sources bleed, the tool acts and fluid flows.
@@ -285,7 +283,7 @@ mod tests {
         TetMesh { positions: (0..4 * (cubes + 1)).map(at).collect(), tets }
     }
 
-    const BRAIN: Perfusion = Perfusion { capillaries: 1.0, has_vessel: false };
+    const BRAIN: Perfusion = Perfusion { capillaries: 1.0, vessel: 0.0 };
 
     fn balance(wound: &Wound) {
         let (account, lies) = (wound.account(), wound.lies_pl());
@@ -313,7 +311,7 @@ mod tests {
     #[test]
     fn heat_stops_a_vessel_rinsing_washes_and_suction_clears() {
         let mesh = bar(8);
-        let cut = Perfusion { capillaries: 0.0, has_vessel: true };
+        let cut = Perfusion { capillaries: 0.0, vessel: 1.0 };
         let mut wound = Wound::of(&mesh, &vec![cut; mesh.tets.len()]);
         wound.remove(30, &mesh.positions, 0.0);
         let (mut ms, positions) = (0.0, &mesh.positions);
@@ -356,7 +354,7 @@ mod tests {
     fn volume_is_kept_to_the_picolitre_while_all_of_a_body_goes() {
         let operate = || {
             let mesh = bar(12);
-            let perfusion = |tet: usize| Perfusion { capillaries: 1.5, has_vessel: tet.is_multiple_of(5) };
+            let perfusion = |tet: usize| Perfusion { capillaries: 1.5, vessel: f32::from(tet.is_multiple_of(5)) };
             let mut wound = Wound::of(&mesh, &(0..mesh.tets.len()).map(perfusion).collect::<Vec<_>>());
             let mut order: Vec<u32> = (0..mesh.tets.len() as u32).collect();
             order.sort_by_key(|tet| tet.wrapping_mul(2_654_435_761) % 1013);

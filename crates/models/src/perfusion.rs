@@ -5,7 +5,7 @@ use trepan_measurements::bleeding;
 use trepan_mesh::{FACES, NONE, Topology};
 use trepan_patient::{RestBrain, TissueClass};
 
-/// Perfusion of each tetrahedron, with capillaries `times` the usual.
+/// Perfusion of each tetrahedron, `times` the usual.
 ///
 /// A vessel by its class is cut where it comes to light. Of the tetrahedra around a tumour some
 /// have one, as many as its border has area for.
@@ -33,7 +33,7 @@ pub fn perfusion(brain: &RestBrain, times: f32) -> Vec<Perfusion> {
             _ => 1.0,
         };
         let has_vessel = is(tet, TissueClass::Vessel) || vessels(border_cm2) > before;
-        Perfusion { capillaries: times * capillaries, has_vessel }
+        Perfusion { capillaries: times * capillaries, vessel: times * f32::from(has_vessel) }
     };
     (0..brain.mesh.tets.len()).map(of).collect()
 }

@@ -73,6 +73,8 @@ pub enum Measure {
     ForceN,
     /// Tissue taken by the aspirator, ml.
     TakenMl,
+    /// Blood that comes, ml/min.
+    BleedsMlPerMin,
     /// Place of the tool in the tray.
     Slot,
     /// Nothing: the last step.
@@ -101,13 +103,14 @@ fn bone_programs() -> Vec<String> {
 }
 
 /// Lessons of the programs.
-const OWN: [&str; 6] = [
+const OWN: [&str; 7] = [
     include_str!("../lessons/1-first-operation.json"),
     include_str!("../lessons/2-straight-through.json"),
     include_str!("../lessons/3-flap.json"),
     include_str!("../lessons/4-press.json"),
     include_str!("../lessons/5-retract.json"),
     include_str!("../lessons/6-resect.json"),
+    include_str!("../lessons/7-bleeding.json"),
 ];
 
 impl Lesson {
@@ -150,7 +153,7 @@ impl Lesson {
 
 impl Step {
     /// Whether a running session has reached the target.
-    fn is_reached(&self, view: &View, taken_ml: f64) -> bool {
+    fn is_reached(&self, view: &View, [taken_ml, ml_per_min]: [f64; 2]) -> bool {
         let value = match self.until {
             Measure::BoneDepthMm => view.depth_mm[0].into(),
             Measure::TissueDepthMm => view.depth_mm[1].into(),
@@ -160,6 +163,7 @@ impl Step {
             Measure::HoldS => view.hold_s,
             Measure::ForceN => view.force.length().into(),
             Measure::TakenMl => taken_ml,
+            Measure::BleedsMlPerMin => ml_per_min,
             Measure::Slot => view.sample.slot as f64,
             Measure::Never => return false,
         };
@@ -206,10 +210,10 @@ impl Guide {
     }
 
     /// Goes on to the next step once the present one is reached; returns the text of the present
-    /// one. `taken_ml`: tissue taken by the aspirator.
-    pub fn follow(&mut self, view: &View, taken_ml: f64) -> String {
+    /// one. `wound`: tissue taken by the aspirator, ml, and blood that comes, ml/min.
+    pub fn follow(&mut self, view: &View, wound: [f64; 2]) -> String {
         let count = self.lesson.steps.len();
-        if self.lesson.steps.get(self.at).is_some_and(|step| step.is_reached(view, taken_ml)) && self.at + 1 < count {
+        if self.lesson.steps.get(self.at).is_some_and(|step| step.is_reached(view, wound)) && self.at + 1 < count {
             self.at += 1;
         }
         let text = self.lesson.steps.get(self.at).map_or("", |step| &step.text);
@@ -239,7 +243,7 @@ mod tests {
     #[test]
     fn a_program_has_its_own_lessons_only() {
         let names = |program| Lesson::of(program, None).into_iter().map(|lesson| lesson.name).collect::<Vec<_>>();
-        assert_eq!(names(Program::Brain), ["press", "retract", "resect"]);
+        assert_eq!(names(Program::Brain), ["press", "retract", "resect", "bleeding"]);
         assert_eq!(names(Program::Craniotomy), ["first-operation", "through", "flap"]);
         assert_eq!(names(Program::Integrated), names(Program::Craniotomy));
         for lesson in Lesson::all(None) {
@@ -257,7 +261,7 @@ mod tests {
         let sample = ToolSample { tick: 0, state, tool, slot: 3, drilling: false };
         let mut guide = Guide::new(Lesson::all(None).remove(2));
         let mut view = View { removed_mm3: 5000.0, ..View::at(sample, 1.0) };
-        let mut text = |view: &View| (0..9).map(|_| guide.follow(view, 0.0)).last().unwrap_or_default();
+        let mut text = |view: &View| (0..9).map(|_| guide.follow(view, [0.0; 2])).last().unwrap_or_default();
         assert!(text(&view).starts_with("Step 3"), "half a lap is no flap");
         view.flap = FlapPlace::Free;
         assert!(text(&view).contains("Lift the flap"));
@@ -271,12 +275,12 @@ mod tests {
         let sample = ToolSample { tick: 0, state, tool: Program::Integrated.tray()[0], slot: 0, drilling: false };
         let mut view = View::at(sample, 1.0);
         let mut guide = Guide::new(Lesson::all(None).remove(0));
-        assert!(guide.follow(&view, 0.0).starts_with("Step 1 of 6"));
+        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 1 of 6"));
         view.depth_mm[0] = 0.1;
-        assert!(guide.follow(&view, 0.0).starts_with("Step 2"));
-        assert!(guide.follow(&view, 0.0).starts_with("Step 2"), "nothing is removed yet");
+        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 2"));
+        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 2"), "nothing is removed yet");
         view.removed_mm3 = 50.0;
-        assert!(guide.follow(&view, 0.0).starts_with("Step 3"));
+        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 3"));
     }
 
     #[test]
@@ -286,10 +290,10 @@ mod tests {
         let (view, lesson) = (View::at(sample, 1.0), Lesson::all(None).remove(5));
         assert_eq!(lesson.tumour_mm, Some(7.5));
         let mut guide = Guide::new(lesson);
-        assert!(guide.follow(&view, 0.0).starts_with("Step 1 of 5"));
-        assert!(guide.follow(&view, 0.1).starts_with("Step 2"));
-        assert!(guide.follow(&view, 0.1).starts_with("Step 2"));
-        assert!(guide.follow(&view, 0.9).starts_with("Step 3"));
+        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 1 of 5"));
+        assert!(guide.follow(&view, [0.1, 0.0]).starts_with("Step 2"));
+        assert!(guide.follow(&view, [0.1, 0.0]).starts_with("Step 2"));
+        assert!(guide.follow(&view, [0.9, 0.0]).starts_with("Step 3"));
     }
 
     #[test]

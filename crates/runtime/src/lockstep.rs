@@ -99,12 +99,12 @@ pub fn run(
 }
 
 /// Replays every tick of a recording, without a journal or a picture, and compares the forces.
-pub fn compare(stages: Stages, recording: &Recording, start: ToolSample) -> Replayed {
+pub fn compare(stages: Stages, recording: &Recording, start: ToolSample) -> Outcome {
     let (senders, _receivers) = journal(stages.haptic.force_scale());
     let mut replay = Replay::new(stages, recording, senders, start);
     let clock = Clock::start();
     recording.ticks.iter().for_each(|record| _ = replay.tick(record, &clock));
-    replay.replayed
+    replay.outcome()
 }
 
 /// State of a replay.

@@ -153,16 +153,13 @@ pub struct Options {
     /// [default: 0.3, fitted to the shift of 61 patients; with support=base 0.05, uncalibrated]
     #[arg(help_heading = "Models and accuracy", long, value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,
-    /// How much faster than in a patient the fluid drains, 1 to 1000 [default: 60, a minute for an
-    /// hour; a replay's as recorded]
+    /// How much faster than in a patient the fluid drains, 1 to 1000 [default: 60]
     #[arg(help_heading = "Models and accuracy", long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub csf_speed_up: Option<f32>,
-    /// Brain that the aspirator takes for each area in contact, mm/s, 0 to 50 [default: 8,
-    /// uncalibrated; a replay's as recorded]
+    /// Rate at which the aspirator takes brain, 0 to 50 [default: 8, uncalibrated]
     #[arg(help_heading = "Models and accuracy", long, value_name = "MM/S", allow_negative_numbers = true)]
     pub aspiration: Option<f32>,
-    /// How much cut tissue bleeds, over the usual; 0 for none [default: 1, uncalibrated; a replay's
-    /// as recorded]
+    /// Bleeding over the usual, 0 to 20 [default: 1, uncalibrated]
     #[arg(help_heading = "Models and accuracy", long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub bleeding: Option<f32>,
     /// Tissue classes (as for --tissue) that raise a warning when a tool comes close, separated by

@@ -17,7 +17,7 @@ use trepan_models::measure::CaseErrors;
 use trepan_patient::import::Facts;
 use trepan_patient::opening::Opening;
 use trepan_patient::{Brain, Case};
-use trepan_runtime::{Stages, lockstep};
+use trepan_runtime::{Outcome, SolverOutcome, Stages, lockstep};
 use trepan_soft::boxes;
 use trepan_stages::collision_step::SoftFrame;
 use trepan_stages::haptic_tick::{TickInput, ToolSample};
@@ -112,9 +112,8 @@ fn operated(line: &str) -> (Recording, SessionSetup) {
     (recording, setup)
 }
 
-/// The same by a hand, with the cheaper solver from a tick on; also what is left of each
-/// tetrahedron.
-fn operated_by(hand: fn(u64) -> ToolState, line: &str, cheaper_from: u64) -> (Recording, SessionSetup, Vec<u16>) {
+/// The same by a hand, with the cheaper solver from a tick on; also what it made of the brain.
+fn operated_by(hand: fn(u64) -> ToolState, line: &str, cheaper_from: u64) -> (Recording, SessionSetup, SolverOutcome) {
     let setup = setup(&format!("--quality usual {line}"), None);
     let Stages { mut haptic, tissue, .. } = stages(&setup);
     let mut tissue = tissue.expect("the program has tissue");
@@ -140,15 +139,22 @@ fn operated_by(hand: fn(u64) -> ToolState, line: &str, cheaper_from: u64) -> (Re
     assert_eq!((faults.contacts_left_out, faults.restless_steps), (0, 0), "{line}");
     let config = setup.models.config(setup.ingredients());
     recording.header.config = SessionConfig { operation: setup.operation.clone(), ..config }.entries();
-    (recording, setup, tissue.solver.fills().to_vec())
+    let bleeding = tissue.collision.bleeds().cloned();
+    (recording, setup, SolverOutcome { bleeding, ..SolverOutcome::of(&tissue.solver) })
 }
 
 /// Ticks that give the same force when the recording is replayed by its header.
 fn replayed(recording: &Recording) -> (u64, SessionSetup) {
+    let (outcome, setup) = again(recording);
+    (outcome.replayed.unwrap().identical, setup)
+}
+
+/// Outcome of a replay by the recording's header.
+fn again(recording: &Recording) -> (Outcome, SessionSetup) {
     let setup = setup("", Some(recording));
     let tool = Program::Integrated.tray()[0];
     let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false };
-    (lockstep::compare(stages(&setup), recording, start).identical, setup)
+    (lockstep::compare(stages(&setup), recording, start), setup)
 }
 
 /// Largest difference on bone and on the brain: of the forces, N, and of the torques, N mm.
@@ -266,18 +272,26 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
 
 #[test]
 fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
-    let (recording, setup, fills) = operated_by(aspirating, "--set element=locking-free --aspiration 50", 1100);
+    let line = "--set element=locking-free --aspiration 50 --bleeding 20";
+    let (recording, setup, SolverOutcome { fills, bleeding, .. }) = operated_by(aspirating, line, 1100);
     let resection = setup.resection(&fills).unwrap();
     let names: Vec<&str> = resection.tissues.keys().map(String::as_str).collect();
     assert!(resection.healthy_mm3 > 30.0 && names == ["brain", "grey"], "{resection:?}");
     assert_eq!(resection.tumour_share, 0.0, "there is none");
     assert!(fills.iter().any(|fill| (1..u16::MAX).contains(fill)));
-    assert_eq!(replayed(&recording).0, END - 1);
-    let (pressed, without, whole) = operated_by(aspirating, "--set element=locking-free --aspiration 0", 1100);
+    let bled = bleeding.as_ref().unwrap();
+    assert!(bled.bled_ml > 1e-3 && bled.sucked_ml > 0.0 && bled.stains.iter().any(|stain| *stain > 0), "{bled:?}");
+    let again = again(&recording).0;
+    let same = again.solver.unwrap().bleeding.unwrap();
+    // No tick heard of the last collision step.
+    assert_eq!((same.bled_ml, same.sucked_ml, &same.stains), (bled.bled_ml, bled.sucked_ml, &bled.stains));
+    assert_eq!(again.replayed.unwrap().identical, END - 1);
+    let (pressed, without, SolverOutcome { fills: whole, .. }) =
+        operated_by(aspirating, "--set element=locking-free --aspiration 0", 1100);
     assert!(whole.is_empty() && without.resection(&whole).is_none());
     let sum_n = |recording: &Recording| recording.ticks.iter().map(|tick| tick.wrench.force.length()).sum::<f32>();
     assert!(sum_n(&recording) < 0.97 * sum_n(&pressed), "{} {} N", sum_n(&recording), sum_n(&pressed));
-    let (_, rival, whole) = operated_by(aspirating, "--set search=hashed-grid", END);
+    let (_, rival, SolverOutcome { fills: whole, .. }) = operated_by(aspirating, "--set search=hashed-grid", END);
     assert!(whole.is_empty() && rival.no_aspiration().is_some_and(|why| why.contains("search=walk")));
 }
 

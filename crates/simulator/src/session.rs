@@ -42,7 +42,7 @@ use trepan_runtime::lockstep;
 use trepan_runtime::stop::Stop;
 use trepan_runtime::threads::{self, Devices, Pace};
 use trepan_runtime::watch::{self, PeerSession, Share, TeacherRequests};
-use trepan_runtime::{Outcome, RenderInputs, Run, Stages, View};
+use trepan_runtime::{Outcome, RenderInputs, Run, SolverOutcome, Stages, View};
 use trepan_stages::haptic_tick::ToolSample;
 use trepan_stages::program::Program;
 use trepan_volume::VoxelVolume;
@@ -236,8 +236,8 @@ impl Session {
         let ended = watching.and_then(|watching| watching.ended());
         ended.iter().for_each(|text| tracing::info!("{text}"));
         let recording = Recording::open(&record)?;
-        let fills = outcome.solver.as_ref().map_or(&[][..], |solver| &solver.fills);
-        self.map(&mut album, &recording, fills);
+        let solver = outcome.solver.clone().unwrap_or_default();
+        self.map(&mut album, &recording, &solver);
         let mut remarks = self.setup.scene.remarks.clone();
         remarks.extend(self.setup.models.unmet.iter().cloned());
         let (lack, unlike) = self.replay_remarks();
@@ -257,7 +257,7 @@ impl Session {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
             plan: self.setup.bone().and_then(|bone| PlanComparison::of(&self.setup.plan, bone)),
             regions: self.setup.regions(&recording),
-            resection: self.setup.resection(fills),
+            resection: self.setup.resection(&solver.fills),
             remarks,
             machine: Machine::here(adapter),
             ..self.about(&album)
@@ -472,12 +472,12 @@ impl Session {
 
     /// Inserts sharp pictures of the opening and of faults, and the final colour maps, before the
     /// session's pictures.
-    fn map(&self, album: &mut Album, recording: &Recording, fills: &[u16]) {
+    fn map(&self, album: &mut Album, recording: &Recording, end: &SolverOutcome) {
         let Some(painter) = &mut album.painter else { return };
         let folder = self.out.join("frames");
         // In a window the pictures of the session are as coarse as its frame rate wants.
         let sharp = painter.set_quality(false, 1.0).map_err(SessionError::from).map(|()| {
-            let close = self.setup.close_pictures(painter, recording, fills, &folder);
+            let close = self.setup.close_pictures(painter, recording, end, &folder);
             close.into_iter().chain(self.setup.maps(painter, recording, &folder)).collect::<Vec<_>>()
         });
         let of_session = std::mem::take(&mut album.shots);

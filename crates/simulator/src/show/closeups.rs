@@ -1,8 +1,8 @@
 //! Sharp pictures for the report: the opening at the end, and the tool at the faults.
 //!
 //! # Practice
-//! Bone is drawn as it is at the end of the session and the brain as at rest: neither is kept for
-//! the time of a fault, the tool's pose is. Each picture takes up to a second on a processor.
+//! Bone and wound are drawn as they are at the end of the session, the brain's shape as at rest:
+//! none is kept for the time of a fault, the tool's pose is. Each picture takes up to a second on a processor.
 
 use crate::error::SessionError;
 use crate::session_setup::SessionSetup;
@@ -13,6 +13,7 @@ use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, TickRecord};
 use trepan_render::{Camera, Frame, Painter, SliceLook};
 use trepan_report::page::Shot;
+use trepan_runtime::SolverOutcome;
 
 /// Field of view, which shows 35 mm from 250 mm, rad.
 const CLOSE_RAD: f32 = 0.14;
@@ -22,20 +23,22 @@ const MOST_FAULTS: usize = 4;
 const GRAVE: [&str; 4] = ["brain-touched", "brain-pressed", "forbidden-near", "break-through"];
 
 impl SessionSetup {
-    /// Draws the opening and the tool at the first warning of each kind, the gravest kinds, without
-    /// the tetrahedra of which nothing is left.
+    /// Draws the opening and the tool at the first warning of each kind, the gravest kinds, as the
+    /// wound is at the end: without the tetrahedra of which nothing is left, with its blood.
     pub fn close_pictures(
         &self,
         painter: &mut Painter,
         recording: &Recording,
-        fills: &[u16],
+        end: &SolverOutcome,
         folder: &Path,
     ) -> Vec<Result<Shot, SessionError>> {
         let shown = self.program.has_bone();
-        let gone: Vec<bool> = fills.iter().map(|fill| *fill == 0).collect();
+        let gone: Vec<bool> = end.fills.iter().map(|fill| *fill == 0).collect();
+        let stains = end.bleeding.as_ref().map(|bleeding| &bleeding.stains[..]);
         let plain = |camera: Camera| Frame {
             show_bone: shown,
             brain_gone: Some(&gone[..]).filter(|gone| !gone.is_empty()),
+            brain_stains: stains,
             slices: SliceLook { shown: false, ..SliceLook::default() },
             ..Frame::of(camera)
         };

@@ -313,7 +313,9 @@ impl window::Session for Show {
         let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
-        let step = self.guide.as_mut().map(|guide| guide.follow(view, self.shown.taken_ml(&self.brain)));
+        let step = self.guide.as_mut().map(|guide| {
+            guide.follow(view, [self.shown.taken_ml(&self.brain), self.brain.bleeding.rate_ml_per_min.into()])
+        });
         let usual = || if teaches { TEACH } else { notice_text::hint(&view.sample.tool, by_hand) }.into();
         let hint = step.unwrap_or_else(usual);
         let flap = || Action {
