@@ -14,6 +14,7 @@ fn a_script_passes_every_lesson() {
             "script:resect --duration 45 --aspiration 50 --csf-loss 0",
             ("resect", include_str!("../../../crates/report/lessons/6-resect.json")),
         ),
+        ("script:bleed --duration 60", ("bleeding", include_str!("../../../crates/report/lessons/7-bleeding.json"))),
     ];
     passing::all_pass(env!("CARGO_BIN_EXE_brain"), &lessons);
 }

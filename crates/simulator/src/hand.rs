@@ -88,6 +88,7 @@ fn refused(fault: impl std::fmt::Display) -> SessionError {
 fn script_s(name: &str, plan: &Plan) -> f64 {
     match (name, plan.target) {
         ("flap", _) => 75.0,
+        ("bleed", _) => 150.0,
         ("resect", target) => {
             60.0 + target
                 .map_or(60.0, |target| f64::from(target.radius_mm).powi(2) * (0.43 * f64::from(target.radius_mm) + 2.0))

@@ -82,7 +82,7 @@ impl Operation {
 
     /// Takes settings from the options, and missing ones from the replayed recording, if any.
     pub fn of(options: &Options, device: &DeviceName, recorded: Option<&Self>) -> Self {
-        let cuts_flap = matches!(device.operation(), Some("flap" | "resect"));
+        let cuts_flap = matches!(device.operation(), Some("flap" | "resect" | "bleed"));
         let flap_mm = if cuts_flap { SCRIPTED_FLAP_MM } else { 0.0 };
         let tumour = if device.operation() == Some("resect") { SCRIPTED_TUMOUR_MM } else { &[] };
         let base = recorded.cloned().unwrap_or_else(|| Self { flap_mm, tumour: tumour.into(), ..Self::default() });

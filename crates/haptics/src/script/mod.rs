@@ -35,9 +35,10 @@ use trepan_geometry::{ToolState, Wrench};
 /// `aspirate` is for the second hand: its tool approaches beside the burr and rests on the bone.
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
 /// minute. `press` and `retract` hold the brain aside with the probe and with the spatula. `resect`
-/// opens a flap and takes a ball of tissue away with the aspirator, layer by layer.
-pub const NAMES: [&str; 8] =
-    ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract", "resect"];
+/// opens a flap, takes a ball of tissue away with the aspirator, layer by layer, and goes around the
+/// wound with the bipolar; `bleed` does so with a small ball.
+pub const NAMES: [&str; 9] =
+    ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract", "resect", "bleed"];
 
 /// A script could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -263,7 +264,9 @@ mod tests {
         let script = Script::planned("resect", &site, 120_000.0, &plan).unwrap();
         let all: Vec<ToolState> = ticks(&script).collect();
         let taken = all.iter().position(|t| t.buttons.taken() == Some(ToolKind::Aspirator)).unwrap();
-        let tips: Vec<&ToolState> = all[taken..].iter().filter(|t| t.buttons.has(Buttons::PEDAL)).collect();
+        let closes = all.iter().position(|t| t.buttons.taken() == Some(ToolKind::Bipolar)).unwrap();
+        let pressed = |t: &&ToolState| t.buttons.has(Buttons::PEDAL);
+        let tips: Vec<&ToolState> = all[taken..closes].iter().filter(pressed).collect();
         let tip_mm = plan.aspirator_radius_mm;
         let inside = |t: &&&ToolState| depth(&site, t) > 10.1;
         for tool in tips.iter().filter(inside) {
@@ -282,6 +285,10 @@ mod tests {
         let near = |at: &&Vec3| tips.iter().any(|t| t.tip().distance(**at) < tip_mm + 0.3);
         let reached = places.iter().filter(near).count();
         assert!(20 * reached > 19 * places.len(), "{reached} of {} places", places.len());
+        let burns: Vec<&ToolState> = all[closes..].iter().filter(pressed).collect();
+        let wall = places.iter().filter(|at| at.distance(target.centre) > 6.5);
+        let far = wall.filter(|at| burns.iter().all(|t| t.tip().distance(**at) > 2.5)).count();
+        assert_eq!(far, 0, "the bipolar comes near every place of the wall");
         let (a, b) = (script.at(90_000.0), script.at(90_001.0));
         let turn = (b.world_from_tool.rotation * a.world_from_tool.rotation.inverse()).to_scaled_axis();
         assert!((turn - script.at(90_000.5).twist.angular).length() < 1e-4, "{turn}");

@@ -176,8 +176,10 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
             let (start, moves) = flap(site, plan);
             (start, upright, moves)
         }
-        "resect" => {
+        "resect" | "bleed" => {
             let (start, moves) = opened(site, plan);
+            let small = Target { centre: site.below(site.brain_mm + 1.5), radius_mm: 3.5, sinks_mm: 0.0 };
+            let plan = &Plan { target: if name == "bleed" { Some(small) } else { plan.target }, ..plan.clone() };
             let at_brain = resect(site, plan).into_iter().chain(coagulate(site, plan));
             (start, upright, moves.into_iter().chain(at_brain.filter(|_| plan.presses_after_flap)).collect())
         }
@@ -290,19 +292,6 @@ const LAYER_MM: f32 = 1.5;
 /// Corners of a circle.
 const CORNERS: u8 = 12;
 
-/// Layers of the target as its ball shrunk by some mm, from above: where each has its middle and
-/// how wide it is. The target may lie anywhere between its place at rest and where it sinks to.
-fn layers(site: &Site, target: &Target, reach_mm: f32, layer_mm: f32) -> impl Iterator<Item = (Vec3, f32)> {
-    let Target { centre, sinks_mm, .. } = *target;
-    let (inward, long_mm) = (site.inward, 2.0 * reach_mm + sinks_mm);
-    let layers = (long_mm / layer_mm).ceil().max(1.0) as u8;
-    (0..=layers).map(move |layer| {
-        let below_mm = long_mm * f32::from(layer) / f32::from(layers) - reach_mm;
-        let from_middle_mm = below_mm.min(0.0) + (below_mm - sinks_mm).max(0.0);
-        (centre + below_mm * inward, (reach_mm * reach_mm - from_middle_mm * from_middle_mm).max(0.0).sqrt())
-    })
-}
-
 /// Corners of a circle across the approach.
 fn corners(site: &Site, middle: Vec3, radius_mm: f32) -> impl Iterator<Item = Vec3> {
     let turn = Quat::from_rotation_arc(Vec3::NEG_Z, site.inward.normalize());
@@ -320,7 +309,8 @@ fn target(site: &Site, plan: &Plan) -> (Target, Vec3) {
     (target, target.centre - site.inward * (deep_mm - site.brain_mm + plan.aspirator_radius_mm + 1.0))
 }
 
-/// Takes the target away with the aspirator, layer by layer from above, each from the middle.
+/// Takes the target away with the aspirator, layer by layer from above, each from the middle. The
+/// target may lie anywhere between its place at rest and where it sinks to.
 fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
     let (target, top) = target(site, plan);
     let away = site.below(-plan.away_mm);
@@ -329,7 +319,15 @@ fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
         Move("come to the brain", 6.0, top, HANDS_OFF),
     ];
     let mut last = top;
-    for (middle, wide_mm) in layers(site, &target, (target.radius_mm - plan.aspirator_radius_mm).max(0.0), LAYER_MM) {
+    let Target { centre, sinks_mm, .. } = target;
+    let reach_mm = (target.radius_mm - plan.aspirator_radius_mm).max(0.0);
+    let long_mm = 2.0 * reach_mm + sinks_mm;
+    let layers = (long_mm / LAYER_MM).ceil().max(1.0) as u8;
+    for layer in 0..=layers {
+        let below_mm = long_mm * f32::from(layer) / f32::from(layers) - reach_mm;
+        let from_middle_mm = below_mm.min(0.0) + (below_mm - sinks_mm).max(0.0);
+        let wide_mm = (reach_mm * reach_mm - from_middle_mm * from_middle_mm).max(0.0).sqrt();
+        let middle = centre + below_mm * site.inward;
         let circles = (wide_mm / LAYER_MM).ceil() as u8;
         let radius = |circle: u8| wide_mm * f32::from(circle) / f32::from(circles);
         for tip in [middle].into_iter().chain((1..=circles).flat_map(|c| corners(site, middle, radius(c)))) {
@@ -356,8 +354,17 @@ fn coagulate(site: &Site, plan: &Plan) -> Vec<Move> {
         Move("come to the wound", 6.0, top, HANDS_OFF),
     ];
     let mut last = top;
-    let wall = layers(site, &target, target.radius_mm, COAGULATED_MM);
-    for tip in wall.flat_map(|(middle, wide_mm)| corners(site, middle, wide_mm)) {
+    let Target { centre, radius_mm, sinks_mm } = target;
+    let quarter_mm = radius_mm * std::f32::consts::FRAC_PI_2;
+    let circles = ((2.0 * quarter_mm + sinks_mm) / COAGULATED_MM).ceil() as u8;
+    let wall = (0..=circles).flat_map(|circle| {
+        let way_mm = (2.0 * quarter_mm + sinks_mm) * f32::from(circle) / f32::from(circles);
+        let (upper, lower) = (way_mm.min(quarter_mm), (way_mm - quarter_mm - sinks_mm).max(0.0));
+        let below_mm = (way_mm - quarter_mm).clamp(0.0, sinks_mm) - radius_mm * (upper / radius_mm).cos();
+        let middle = centre + (below_mm + radius_mm * (lower / radius_mm).sin()) * site.inward;
+        corners(site, middle, radius_mm * (upper / radius_mm).sin() * (lower / radius_mm).cos())
+    });
+    for tip in wall {
         let share = COAGULATING_SHARE * f64::from(tip.distance(last).max(0.2));
         moves.push(Move("coagulate", share, tip, Buttons::PEDAL));
         last = tip;

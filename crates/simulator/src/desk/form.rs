@@ -30,10 +30,11 @@ pub(crate) struct Form {
 }
 
 /// A demonstration by script: its name, what it shows.
-const DEMONSTRATIONS: [(&str, &str); 3] = [
+const DEMONSTRATIONS: [(&str, &str); 4] = [
     ("", "the whole operation, by itself"),
     ("flap", "a bone flap is cut, by itself"),
     ("resect", "tissue is aspirated, by itself"),
+    ("bleed", "a bleeding is stopped, by itself"),
 ];
 
 impl Form {
@@ -53,7 +54,7 @@ impl Form {
         let mouse = ("mouse".to_string(), choosable("mouse", "the mouse moves the tool; walls are not felt", true));
         let demonstrations = DEMONSTRATIONS.iter().filter(|(name, _)| match *name {
             "flap" => program.has_bone(),
-            "resect" => program.has_tissue(),
+            "resect" | "bleed" => program.has_tissue(),
             _ => true,
         });
         let shown = demonstrations.map(|(name, hint)| {
