@@ -35,8 +35,8 @@ use trepan_geometry::{ToolState, Wrench};
 /// `aspirate` is for the second hand: its tool approaches beside the burr and rests on the bone.
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
 /// minute. `press` and `retract` hold the brain aside with the probe and with the spatula. `resect`
-/// opens a flap, takes a ball of tissue away with the aspirator, layer by layer, and goes around the
-/// wound with the bipolar; `bleed` does so with a small ball.
+/// opens a flap, takes a ball of tissue away with the aspirator, layer by layer, and goes around
+/// the wound with the bipolar; `bleed` does so with a small ball.
 pub const NAMES: [&str; 9] =
     ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract", "resect", "bleed"];
 

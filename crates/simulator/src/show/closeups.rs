@@ -2,7 +2,8 @@
 //!
 //! # Practice
 //! Bone and wound are drawn as they are at the end of the session, the brain's shape as at rest:
-//! none is kept for the time of a fault, the tool's pose is. Each picture takes up to a second on a processor.
+//! none is kept for the time of a fault, the tool's pose is. Each picture takes up to a second on a
+//! processor.
 
 use crate::error::SessionError;
 use crate::session_setup::SessionSetup;
@@ -23,8 +24,8 @@ const MOST_FAULTS: usize = 4;
 const GRAVE: [&str; 4] = ["brain-touched", "brain-pressed", "forbidden-near", "break-through"];
 
 impl SessionSetup {
-    /// Draws the opening and the tool at the first warning of each kind, the gravest kinds, as the
-    /// wound is at the end: without the tetrahedra of which nothing is left, with its blood.
+    /// Draws the opening, and the tool at the first warning of each kind, the gravest kinds. The
+    /// wound is that of the end: its blood, and no tetrahedra of which nothing is left.
     pub fn close_pictures(
         &self,
         painter: &mut Painter,
