@@ -59,6 +59,9 @@ fn blueish([r, _, b]: [i32; 3]) -> bool {
     b > r + 40
 }
 
+/// Blood of 0 to 2 mm on the nodes of the cube, and burns.
+const STAINS: [u8; 8] = [0, 20, 60, 200, 255, 0, 255, 10];
+
 /// Every look, alone and all together.
 fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame<'a>)> {
     let pose = Pose::from_parts(
@@ -85,6 +88,7 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
         ("drilling", Frame { drilling: true, ..base }),
         ("tube and mill", Frame { tool: Some(Tool::aspirator()), second: Some((Tool::craniotome(), aside)), ..base }),
         ("tines", Frame { tool: Some(Tool::bipolar()), ..base }),
+        ("blood and a burn", Frame { brain_stains: Some(&STAINS), show_bone: false, ..base }),
         ("both eyes", Frame { stereo: stereo(StereoLook::SideBySide), ..all }),
         ("anaglyph", Frame { stereo: stereo(StereoLook::Anaglyph), ..all }),
         ("all with slices", Frame { slices: SliceLook::default(), ..all }),
@@ -128,7 +132,7 @@ fn pictures_are_the_stored_ones_by_all_that_draw() {
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
     let mut on_device = device().map(|gpu| scene::renderer(&gpu, &data, size));
     let (paint, markers) = (blue(4.0, 1), [Vec3::new(10.0, 24.0, -6.0), Vec3::new(0.0, 0.0, 0.0)]);
-    for (name, frame) in frames(&paint, &markers).into_iter().take(11) {
+    for (name, frame) in frames(&paint, &markers).into_iter().take(12) {
         on_processor.draw(&frame).expect("drawn");
         let mut images = vec![on_processor.image().clone()];
         images.extend(on_device.as_mut().map(|device| {
