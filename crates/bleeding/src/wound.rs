@@ -12,6 +12,8 @@ const PER_MIN: f32 = 1e3 * PL / 60e3;
 const PARTS: usize = 9;
 /// Longest time that a turn makes up for, ms; numerical: blood does not flow in a pause.
 const LONGEST_MS: f64 = 50.0;
+/// Parts of an edge in the lattice of points on a face, numerical.
+const LATTICE: u8 = 4;
 /// Blood over a burn from which that is not seen, mm; numerical.
 const HIDES_MM: f32 = 0.1;
 /// Depth of blood that a stain counts to, mm, and the stain of it; numerical. Beyond is a burn.
@@ -211,10 +213,12 @@ impl Wound {
         self.border.nodes(face).map(|node| positions[node as usize]).into_iter().sum::<Vec3>() / 3.0
     }
 
-    /// Distance of a place from a face: from its middle or a corner.
+    /// Distance of a place from a face, by a lattice of points on it.
     fn away(&self, positions: &[Vec3], face: u32, place: Vec3) -> f32 {
-        let corners = self.border.nodes(face).map(|node| positions[node as usize].distance(place));
-        corners.into_iter().fold(self.middle(positions, face).distance(place), f32::min)
+        let [a, b, c] = self.border.nodes(face).map(|node| positions[node as usize]);
+        let rows = (0..=LATTICE).flat_map(|i| (0..=LATTICE - i).map(move |j| [f32::from(i), f32::from(j)]));
+        let points = rows.map(|[i, j]| a + (i * (b - a) + j * (c - a)) / f32::from(LATTICE));
+        points.map(|point| point.distance_squared(place)).fold(f32::INFINITY, f32::min).sqrt()
     }
 
     fn stain(&mut self, positions: &[Vec3]) {

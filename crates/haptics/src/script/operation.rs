@@ -345,7 +345,8 @@ const COAGULATING_SHARE: f64 = 0.65;
 /// Distance between the circles of the bipolar, mm: less than twice its reach.
 const COAGULATED_MM: f32 = 2.5;
 
-/// Goes around the wall of what was taken away with the bipolar, from above, and over its ground.
+/// Goes along the wall of what was taken away with the bipolar, from above, where the aspirator's
+/// middle was: so its tips come near the wall and do not press it.
 fn coagulate(site: &Site, plan: &Plan) -> Vec<Move> {
     let (target, top) = target(site, plan);
     let away = site.below(-plan.away_mm);
@@ -354,7 +355,8 @@ fn coagulate(site: &Site, plan: &Plan) -> Vec<Move> {
         Move("come to the wound", 6.0, top, HANDS_OFF),
     ];
     let mut last = top;
-    let Target { centre, radius_mm, sinks_mm } = target;
+    let Target { centre, sinks_mm, .. } = target;
+    let radius_mm = (target.radius_mm - plan.aspirator_radius_mm).max(0.5);
     let quarter_mm = radius_mm * std::f32::consts::FRAC_PI_2;
     let circles = ((2.0 * quarter_mm + sinks_mm) / COAGULATED_MM).ceil() as u8;
     let wall = (0..=circles).flat_map(|circle| {

@@ -42,6 +42,7 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
     let mut tissue = stages.tissue.take().context("the program has tissue")?;
     let (mut frame, mut newest) = (SoftFrame::default(), (0, SurfacePatch::default()));
     let (mut last, mut most_n, mut most_step_n, mut opened_ms) = (Vec3::ZERO, 0.0f32, 0.0f32, None);
+    let (mut dbg, mut nbig) = (Vec3::ZERO, 0);
     for tick in 1..=END_MS {
         let (reading, (patch_seq, patch)) = (script.read(tick as f64), &newest);
         let input = TickInput { tick, reading, patch, patch_seq: *patch_seq, second: None };
@@ -56,6 +57,23 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
         most_step_n = most_step_n.max(force.distance(std::mem::replace(&mut last, force)));
         tissue.solver.publish(&mut frame);
         let record = tissue.collision.step(&done.sample, &frame);
+        if force.distance(dbg) > 0.06 {
+            nbig += 1;
+            if nbig < 14 {
+                eprintln!(
+                    "{tick} {:?} {force} was {dbg} tip {} depth {} pts {} patch {} {} was {} {}",
+                    done.sample.tool.kind,
+                    done.sample.state.tip(),
+                    record.depth_mm,
+                    record.points,
+                    tissue.collision.patch().normal,
+                    tissue.collision.patch().force_n,
+                    newest.1.normal,
+                    newest.1.force_n
+                );
+            }
+        }
+        dbg = force;
         newest = (record.seq, *tissue.collision.patch());
         while tissue.solver.time_ms() < since_ms as f64 {
             tissue.solver.step(tissue.collision.loads(), record.seq);
