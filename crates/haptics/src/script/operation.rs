@@ -345,8 +345,8 @@ const COAGULATING_SHARE: f64 = 0.65;
 /// Distance between the circles of the bipolar, mm: less than twice its reach.
 const COAGULATED_MM: f32 = 2.5;
 
-/// Goes along the wall of what was taken away with the bipolar, from above, where the aspirator's
-/// middle was: so its tips come near the wall and do not press it.
+/// Goes with the bipolar along the wall of what was taken away, from above. It goes where the
+/// aspirator's middle was, so that its tips come near the wall and do not press it.
 fn coagulate(site: &Site, plan: &Plan) -> Vec<Move> {
     let (target, top) = target(site, plan);
     let away = site.below(-plan.away_mm);
