@@ -14,7 +14,7 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Plan, Script};
 use trepan_patient::TissueClass;
 use trepan_simulator::{Options, Session};
-use trepan_stages::{Phase, Program, SoftFrame, TickInput};
+use trepan_stages::{CollisionStage, Phase, Program, SoftFrame, SolverStage, TickInput};
 use trepan_trials_scenes::case;
 
 /// Length of the operation, bone included, ms.
@@ -42,7 +42,6 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
     let mut tissue = stages.tissue.take().context("the program has tissue")?;
     let (mut frame, mut newest) = (SoftFrame::default(), (0, SurfacePatch::default()));
     let (mut last, mut most_n, mut most_step_n, mut opened_ms) = (Vec3::ZERO, 0.0f32, 0.0f32, None);
-    let (mut dbg, mut nbig) = (Vec3::ZERO, 0);
     for tick in 1..=END_MS {
         let (reading, (patch_seq, patch)) = (script.read(tick as f64), &newest);
         let input = TickInput { tick, reading, patch, patch_seq: *patch_seq, second: None };
@@ -57,46 +56,40 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
         most_step_n = most_step_n.max(force.distance(std::mem::replace(&mut last, force)));
         tissue.solver.publish(&mut frame);
         let record = tissue.collision.step(&done.sample, &frame);
-        if force.distance(dbg) > 0.06 {
-            nbig += 1;
-            if nbig < 14 {
-                eprintln!(
-                    "{tick} {:?} {force} was {dbg} tip {} depth {} pts {} patch {} {} was {} {}",
-                    done.sample.tool.kind,
-                    done.sample.state.tip(),
-                    record.depth_mm,
-                    record.points,
-                    tissue.collision.patch().normal,
-                    tissue.collision.patch().force_n,
-                    newest.1.normal,
-                    newest.1.force_n
-                );
-            }
-        }
-        dbg = force;
         newest = (record.seq, *tissue.collision.patch());
         while tissue.solver.time_ms() < since_ms as f64 {
             tissue.solver.step(tissue.collision.loads(), record.seq);
         }
     }
+    let felt = [most_n, most_step_n].map(f64::from);
+    judge(&format!("resection, {quality}"), &session, (&tissue.collision, &tissue.solver), felt, findings)
+}
+
+/// Adds what is left and what bled; `felt`: the largest force and its largest change in a tick, N.
+fn judge(
+    name: &str,
+    session: &Session,
+    (collision, solver): (&CollisionStage, &SolverStage),
+    felt: [f64; 2],
+    findings: &mut Findings,
+) -> Result<()> {
     let brain = session.scene().brain.as_ref().context("the program has a brain")?;
-    let fills = tissue.solver.fills();
+    let fills = solver.fills();
     let (whole, left) = (brain.left_mm3(&vec![u16::MAX; fills.len()]), brain.left_mm3(fills));
     let taken = |at: usize| whole[at] - left[at];
-    let bleeding = tissue.collision.bleeds().context("the wound bleeds")?;
+    let bleeding = collision.bleeds().context("the wound bleeds")?;
     let unaccounted = (bleeding.bled_ml - bleeding.sucked_ml - bleeding.lies_ml).abs() / bleeding.bled_ml;
     let (all_mm3, tumour) = (whole.iter().sum::<f64>(), TissueClass::Tumour as usize);
     let gone_mm3 = (0..whole.len()).map(taken).sum::<f64>();
     let share = taken(tumour) / whole[tumour];
-    let lost = (gone_mm3 - tissue.collision.aspirated_mm3()).abs() / all_mm3;
-    let faults = tissue.solver.solver_faults();
-    let name = format!("resection, {quality}");
+    let lost = (gone_mm3 - collision.aspirated_mm3()).abs() / all_mm3;
+    let faults = solver.solver_faults();
     findings.rows.push(
-        Row::new(&name, session.models().setup.tissue.to_string())
+        Row::new(name, session.models().setup.tissue.to_string())
             .metric("tumour_share", share)
             .metric("healthy_mm3", gone_mm3 - taken(tumour))
             .metric("tetrahedra_gone", fills.iter().filter(|fill| **fill == 0).count() as f64)
-            .metric("most_n", most_n.into())
+            .metric("most_n", felt[0])
             .metric("bled_ml", bleeding.bled_ml)
             .metric("worst_ml_per_min", bleeding.worst_ml_per_min.into())
             .metric("sources_closed", bleeding.coagulated.into())
@@ -109,7 +102,7 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
         Gate::at_most(format!("{name}: elements, nodes and ms that the solver put right"), put_right, 0.0),
         Gate::at_most(format!("{name}: blood not accounted for"), unaccounted, 1e-3),
         Gate::at_most(format!("{name}: bleeding at the end, ml/min"), bleeding.rate_ml_per_min.into(), 1.0),
-        Gate::at_most(format!("{name}: largest change of force in a tick, N"), most_step_n.into(), 0.05),
+        Gate::at_most(format!("{name}: largest change of force in a tick, N"), felt[1], 0.05),
     ]);
     Ok(())
 }
