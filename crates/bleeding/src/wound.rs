@@ -131,9 +131,15 @@ impl Wound {
     }
 
     /// Goes on to a time: a tenth of a turn in which sources bleed, the tool acts and fluid flows.
-    /// `up` is the unit vector against gravity, the tool its tip, mm, the radius of that, and what
-    /// it does.
-    pub fn step(&mut self, now_ms: f64, positions: &[Vec3], up: Vec3, tool: Option<(Vec3, f32, Act)>) {
+    /// `up` is the unit vector against gravity; of each tool its tip, mm, the radius of that, and
+    /// what it does.
+    pub fn step(
+        &mut self,
+        now_ms: f64,
+        positions: &[Vec3],
+        up: Vec3,
+        tools: impl IntoIterator<Item = (Vec3, f32, Act)>,
+    ) {
         if positions.len() != self.stains.len() {
             return;
         }
@@ -161,10 +167,11 @@ impl Wound {
             self.film.pour(source.face, [pl, 0]);
         }
         self.sources.retain(|source| now_ms - source.since_ms < source.lasts_ms);
-        match tool {
-            Some((tip, radius_mm, Act::Suck)) => self.suck(positions, tip, radius_mm, self.turn_ms),
-            Some((tip, radius_mm, Act::Coagulate)) => self.coagulate(positions, tip, radius_mm, self.turn_ms),
-            None => {}
+        for (tip, radius_mm, act) in tools {
+            match act {
+                Act::Suck => self.suck(positions, tip, radius_mm, self.turn_ms),
+                Act::Coagulate => self.coagulate(positions, tip, radius_mm, self.turn_ms),
+            }
         }
         self.stain(positions);
     }

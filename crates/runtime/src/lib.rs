@@ -159,7 +159,7 @@ impl View {
         let slot = usize::from(slot).min(tray.len() - 1);
         let drilling = record.has(TickRecord::DRILLING);
         Self {
-            sample: ToolSample { tick, state, tool: tray[slot], slot, drilling },
+            sample: ToolSample { tick, state, tool: tray[slot], slot, drilling, second: None },
             time_ms,
             force: record.wrench.force,
             task_n: self.force_scale.task_n(record),

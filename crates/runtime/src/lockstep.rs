@@ -25,7 +25,7 @@ use std::collections::VecDeque;
 use std::sync::mpsc::channel;
 use std::thread;
 use trepan_contact::SurfacePatch;
-use trepan_geometry::{Buttons, Pose, ToolState, Wrench};
+use trepan_geometry::{Buttons, ToolState, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::Recording;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
@@ -112,8 +112,8 @@ struct Replay<'a> {
     haptic: HapticStage,
     second: Option<SecondHand>,
     seconds: std::slice::Iter<'a, SecondRecord>,
-    /// Pose of the second hand's tool after the last tick.
-    second_pose: Option<Pose>,
+    /// The second hand's tool after the last tick.
+    second_place: Option<ToolState>,
     tissue: Option<Tissue>,
     collisions: VecDeque<CollisionRecord>,
     switches: VecDeque<SolverRecord>,
@@ -142,7 +142,7 @@ impl<'a> Replay<'a> {
             haptic: stages.haptic,
             second: stages.second,
             seconds: recording.second.iter(),
-            second_pose: None,
+            second_place: None,
             tissue: stages.tissue,
             collisions: recording.collisions.iter().copied().collect(),
             switches: recording.solver.iter().copied().collect(),
@@ -172,7 +172,7 @@ impl<'a> Replay<'a> {
         let &TickRecord { tick, device, twist, buttons, time_ms, flags, .. } = record;
         let tool = ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms };
         let reading = reading(tool, flags);
-        let input = TickInput { tick, reading, patch: &patch, patch_seq, second: self.second_pose };
+        let input = TickInput { tick, reading, patch: &patch, patch_seq, second: self.second_place };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
         }
@@ -183,7 +183,7 @@ impl<'a> Replay<'a> {
             notices.send(notice);
         });
         let second = self.second_tick(record.tick);
-        self.second_pose = self.second.as_ref().and_then(SecondHand::place);
+        self.second_place = self.second.as_ref().and_then(SecondHand::place);
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
         let same = self.same(record.wrench, tick.record.wrench) & second.is_none_or(|(_, same)| same);
@@ -345,7 +345,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
     use trepan_bone::BoneVolume;
-    use trepan_geometry::Vec3;
+    use trepan_geometry::{Pose, Vec3};
     use trepan_stages::force_scale::ForceScale;
     use trepan_stages::haptic_config::HapticConfig;
     use trepan_stages::notice::{Hindrance, What};
@@ -399,7 +399,7 @@ mod tests {
     fn undone_strokes_and_lost_devices_replay_bit_for_bit() {
         let (bone, Stages { mut haptic, second, .. }) = both_hands();
         let mut second = second.expect("a second hand");
-        let (mut recording, mut raised, mut second_pose) = (Recording::default(), Vec::new(), None);
+        let (mut recording, mut raised, mut second_place) = (Recording::default(), Vec::new(), None);
         for tick in 1..4400u32 {
             let [first, other] = hands(tick);
             let input = TickInput {
@@ -407,11 +407,11 @@ mod tests {
                 reading: first,
                 patch: &SurfacePatch::default(),
                 patch_seq: 0,
-                second: second_pose,
+                second: second_place,
             };
             recording.ticks.push(haptic.tick(&input, &mut |notice| raised.push(notice)).record);
             recording.second.push(second.tick(tick.into(), &other, &mut |notice| raised.push(notice)).1);
-            second_pose = second.place();
+            second_place = second.place();
         }
         let undo = |what: &What| matches!(what, What::Undone(_) | What::NotUndone(_));
         let undos: Vec<What> = raised.iter().map(|notice| notice.what).filter(undo).collect();
@@ -425,7 +425,7 @@ mod tests {
         let (again, stages) = both_hands();
         let (senders, _pages) = journal(ForceScale::default());
         let tool = Program::Craniotomy.tray()[0];
-        let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false };
+        let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false, second: None };
         let mut replay = Replay::new(stages, &recording, senders, start);
         recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
         assert_eq!((replay.replayed.identical, replay.replayed.ticks), (4399, 4399));

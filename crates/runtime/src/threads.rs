@@ -43,13 +43,13 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut ticks = Ticks::default();
     let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
-    let (mut waits, mut ending, mut second_pose) = (Waits::default(), None, None);
+    let (mut waits, mut ending, mut second_place) = (Waits::default(), None, None);
     loop {
         waits.until(schedule.next_ms(), &clock);
         let now_ms = clock.now_ms();
         let reading = hands.owner.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
-        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: second_pose };
+        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: second_place };
         let mut notify = |notice| {
             ticks.record(notice);
             ends.notices.send(notice);
@@ -57,7 +57,7 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
         let mut tick = hands.stage.tick(&input, &mut notify);
         hands.owner.device.apply(tick.wrench);
         let second_view = hands.second.as_mut().map(|second| second.tick(input.tick, now_ms, &mut notify));
-        second_pose = hands.second.as_ref().and_then(|second| second.stage.place());
+        second_place = hands.second.as_ref().and_then(|second| second.stage.place());
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
         tick.record.flags |= if schedule.advance(done_ms) { TickRecord::LATE } else { 0 };

@@ -153,7 +153,7 @@ fn replayed(recording: &Recording) -> (u64, SessionSetup) {
 fn again(recording: &Recording) -> (Outcome, SessionSetup) {
     let setup = setup("", Some(recording));
     let tool = Program::Integrated.tray()[0];
-    let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false };
+    let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false, second: None };
     (lockstep::compare(stages(&setup), recording, start), setup)
 }
 

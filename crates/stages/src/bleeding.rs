@@ -2,10 +2,11 @@
 //!
 //! # Practice
 //! The wound follows the collision step, with the brain and the tool that it saw, so that a replay
-//! has the same. An aspirator with its pedal down sucks, bipolar forceps coagulate and rinse. Blood
-//! puts no force on hand or brain.
+//! has the same. An aspirator with its pedal down sucks, in either hand; bipolar forceps coagulate
+//! and rinse. Blood puts no force on hand or brain.
 
 use crate::haptic_tick::ToolSample;
+use crate::second_hand::SecondHand;
 use serde::Serialize;
 use trepan_bleeding::{Act, Perfusion, Wound};
 use trepan_geometry::{Buttons, ToolKind, Vec3};
@@ -54,14 +55,17 @@ impl Bleeder {
     pub fn step(&mut self, sample: &ToolSample, positions: &[Vec3], gone: impl Iterator<Item = u32>) {
         let now_ms = sample.state.time_ms;
         gone.for_each(|tet| self.wound.remove(tet, positions, now_ms));
-        let act = match sample.tool.kind {
-            ToolKind::Aspirator => Some(Act::Suck),
-            ToolKind::Bipolar => Some(Act::Coagulate),
-            _ => None,
-        };
-        let act = act.filter(|_| sample.state.buttons.has(Buttons::PEDAL));
-        let tool = act.map(|act| (sample.state.tip(), sample.tool.tip_radius_mm, act));
-        self.wound.step(now_ms, positions, self.up, tool);
+        let hands = [Some((sample.tool, sample.state)), sample.second.map(|state| (SecondHand::tool(), state))];
+        let tools = hands.into_iter().flatten().filter(|(_, state)| state.buttons.has(Buttons::PEDAL));
+        let acts = tools.filter_map(|(tool, state)| {
+            let act = match tool.kind {
+                ToolKind::Aspirator => Act::Suck,
+                ToolKind::Bipolar => Act::Coagulate,
+                _ => return None,
+            };
+            Some((state.tip(), tool.tip_radius_mm, act))
+        });
+        self.wound.step(now_ms, positions, self.up, acts);
         let (account, lies) = (self.wound.account(), self.wound.lies_pl());
         let ml = |pl: u64| pl as f64 / PL_PER_ML;
         let rate = self.wound.rate_ml_per_min(now_ms);
@@ -71,5 +75,38 @@ impl Bleeder {
         (now.rate_ml_per_min, now.worst_ml_per_min) = (rate, now.worst_ml_per_min.max(rate));
         now.coagulated = self.wound.coagulated();
         now.stains.copy_from_slice(self.wound.stains());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_geometry::{Pose, Tool, ToolState};
+    use trepan_soft::boxes;
+
+    /// A block bleeds from a hole in its top while the first hand holds still over it.
+    #[test]
+    fn the_second_hands_aspirator_sucks_while_its_pedal_is_down() {
+        let mesh = boxes::split_box([4, 4, 4], Vec3::splat(8.0));
+        let brain = Perfusion { capillaries: 1.0, vessel: 1.0 };
+        let top = Vec3::new(4.0, 4.0, 8.0);
+        let middle = |tet: u32| mesh.corners(tet as usize).into_iter().sum::<Vec3>() / 4.0;
+        let hole: Vec<u32> = (0..mesh.tets.len() as u32).filter(|&tet| middle(tet).distance(top) < 2.0).collect();
+        let at = |place: Vec3, buttons: Buttons| ToolState { buttons, ..ToolState::at(Pose::from_translation(place)) };
+        let sucked_ml = |second: Option<ToolState>| {
+            let mut bleeder = Bleeder::of(&mesh, &vec![brain; mesh.tets.len()], Vec3::Z);
+            for tick in 1..2000 {
+                let mut state = at(top + 30.0 * Vec3::Z, Buttons::PEDAL);
+                state.time_ms = tick as f64;
+                let sample = ToolSample { tick, state, tool: Tool::bipolar(), slot: 0, drilling: false, second };
+                let gone = hole.iter().copied().filter(|_| tick == 1);
+                bleeder.step(&sample, &mesh.positions, gone);
+            }
+            assert!(bleeder.now.bled_ml > 0.1 && bleeder.now.coagulated == 0, "{:?}", bleeder.now.bled_ml);
+            bleeder.now.sucked_ml
+        };
+        assert_eq!(sucked_ml(None), 0.0);
+        assert_eq!(sucked_ml(Some(at(top, Buttons(0)))), 0.0, "its pedal is up");
+        assert!(sucked_ml(Some(at(top - 1.5 * Vec3::Z, Buttons::PEDAL))) > 0.1);
     }
 }

@@ -256,7 +256,7 @@ mod tests {
             let mut state = ToolState::at(Pose::from_translation(Vec3::new(12.3, 12.2, z)));
             (state.time_ms, state.buttons) = (tick as f64, pedal);
             solver.publish(&mut frame);
-            let record = stage.step(&ToolSample { tick, state, tool, slot: 0, drilling: false }, &frame);
+            let record = stage.step(&ToolSample { tick, state, tool, slot: 0, drilling: false, second: None }, &frame);
             let point_mm2 = 4.0 * PI * f64::from(tool.tip_radius_mm).powi(2) / stage.tools[0].points() as f64;
             by_law += if tick > 1 { f64::from(record.points) * point_mm2 * f64::from(RATE) } else { 0.0 };
             most_n = most_n.max(stage.patch().force_n);
@@ -307,7 +307,7 @@ mod tests {
         mesh.tets = mesh.tets.iter().copied().filter(|tet| !is_gap(middle(tet))).collect();
         let tool = Program::Brain.tray()[0];
         let far = ToolState::at(Pose::from_translation(Vec3::splat(100.0)));
-        let sample = ToolSample { tick: 1, state: far, tool, slot: 0, drilling: false };
+        let sample = ToolSample { tick: 1, state: far, tool, slot: 0, drilling: false, second: None };
         // Over 4 mm the arms lean inwards, by 5 mm at the end.
         let closed = |p: &Vec3| *p + Vec3::X * if p.z > 4.0 { (6.0 - p.x).signum() * (p.z - 4.0) * 0.35 } else { 0.0 };
         let frame = |positions: Vec<Vec3>| SoftFrame {

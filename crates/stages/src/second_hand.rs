@@ -93,9 +93,12 @@ impl SecondHand {
         Tool::aspirator()
     }
 
-    /// Returns the pose of the proxy; `None` before the device's first pose.
-    pub fn place(&self) -> Option<Pose> {
-        self.last_valid.map(|_| self.rigid.proxy())
+    /// Returns the tool with the pose of the proxy, its pedal up while the force is off; `None`
+    /// before the device's first pose.
+    pub fn place(&self) -> Option<ToolState> {
+        let tool = self.last_valid?;
+        let buttons = if self.fault.waits() || self.released { Buttons(0) } else { tool.buttons };
+        Some(ToolState { world_from_tool: self.rigid.proxy(), buttons, ..tool })
     }
 
     /// Runs a tick, after the first hand's tick of the same number.

@@ -46,8 +46,13 @@ impl Bench {
     fn step(&mut self, tool: ToolState, status: Status, patch: &SurfacePatch) -> TickRecord {
         self.tick += 1;
         let tool = ToolState { time_ms: self.tick as f64, ..tool };
-        let input =
-            TickInput { tick: self.tick, reading: Reading { tool, status }, patch, patch_seq: 1, second: self.second };
+        let input = TickInput {
+            tick: self.tick,
+            reading: Reading { tool, status },
+            patch,
+            patch_seq: 1,
+            second: self.second.map(ToolState::at),
+        };
         let done = self.stage.tick(&input, &mut |notice| self.notices.push(notice));
         let force = done.wrench.force();
         assert!(force.is_finite() && force.length() <= 3.3 + 1e-5, "{force} at tick {}", self.tick);

@@ -141,7 +141,8 @@ mod tests {
 
     fn view(warnings: u32) -> View {
         let tool = Program::Integrated.tray()[1];
-        let sample = ToolSample { tick: 1, state: ToolState::at(Pose::IDENTITY), tool, slot: 1, drilling: true };
+        let sample =
+            ToolSample { tick: 1, state: ToolState::at(Pose::IDENTITY), tool, slot: 1, drilling: true, second: None };
         View { warnings, time_ms: 5000.0, spindle: 0.5, force: Vec3::X, ..View::at(sample, 2.0) }
     }
 

@@ -489,7 +489,14 @@ mod tests {
         let (mut watched, watching) = connected(&format!("ended-{}", std::process::id()));
         std::thread::sleep(std::time::Duration::from_millis(200));
         let start = ToolState::at(Pose::IDENTITY);
-        let sample = ToolSample { tick: 0, state: start, tool: Program::Brain.tray()[0], slot: 0, drilling: false };
+        let sample = ToolSample {
+            tick: 0,
+            state: start,
+            tool: Program::Brain.tray()[0],
+            slot: 0,
+            drilling: false,
+            second: None,
+        };
         let (mut writer, view) = cell(View::at(sample, 1.0));
         let mut show = Show {
             view: View::at(sample, 1.0),

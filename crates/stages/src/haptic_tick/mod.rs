@@ -52,7 +52,7 @@ impl HapticStage {
         let report = &mut |what| notify(Notice { tick: input.tick, time_ms: hand.tool.time_ms, what });
         let intent = self.follow_requests(&hand, input, report);
         let bone = self.touch_bone(&hand, intent, report);
-        let sample = self.sample(&hand, input.tick, intent);
+        let sample = self.sample(&hand, input, intent);
         let is_held = self.touch_tissue(input.patch, &sample);
         let desired = self.desired_wrench(&hand, intent, report);
         let wrench = self.guard.guard(desired.sum(), &hand.tool, self.config.dt_ms);
@@ -109,8 +109,8 @@ pub struct TickInput<'a> {
     pub patch: &'a SurfacePatch,
     /// Its sequence number; 0 before the first.
     pub patch_seq: u64,
-    /// Pose of the second hand's tool after the last tick; `None` without one.
-    pub second: Option<Pose>,
+    /// The second hand's tool after the last tick; `None` without one.
+    pub second: Option<ToolState>,
 }
 
 /// The tool as sent to the other threads.
@@ -126,6 +126,8 @@ pub struct ToolSample {
     pub slot: usize,
     /// Whether the tool cuts.
     pub drilling: bool,
+    /// The second hand's tool one tick before; `None` without one.
+    pub second: Option<ToolState>,
 }
 
 impl ToolSample {
@@ -324,7 +326,7 @@ impl HapticStage {
     fn follow_requests(&mut self, hand: &Hand, input: &TickInput<'_>, report: &mut dyn FnMut(What)) -> Intent {
         self.change_tool(&hand.tool, input.tick <= 1, report);
         let drilling = self.drills(&hand.tool);
-        let restored_mm3 = self.undo(&hand.tool, drilling, input.second, report);
+        let restored_mm3 = self.undo(&hand.tool, drilling, input.second.map(|tool| tool.world_from_tool), report);
         Intent { drilling, restored_mm3 }
     }
 
@@ -366,12 +368,14 @@ impl HapticStage {
     }
 
     /// The tool for the other threads.
-    fn sample(&self, hand: &Hand, tick: u64, intent: Intent) -> ToolSample {
+    fn sample(&self, hand: &Hand, input: &TickInput<'_>, intent: Intent) -> ToolSample {
         let mut state = ToolState { world_from_tool: self.proxy, ..hand.tool };
         if self.bone_step.manifold.touches() {
             state.twist = Default::default();
         }
-        ToolSample { tick, state, tool: self.tool(), slot: self.tray.slot(), drilling: intent.drilling }
+        let (tick, second) = (input.tick, input.second);
+        let (tool, slot) = (self.tool(), self.tray.slot());
+        ToolSample { tick, state, tool, slot, drilling: intent.drilling, second }
     }
 
     /// Sets the contact with tissue at the present pose; returns whether the patch in contact is

@@ -77,7 +77,14 @@ fn retraction(brain: &RestBrain, entry: Vec3, inward: Vec3) -> Result<Row> {
         let pose = Pose::from_parts(entry + inward * (depth_mm - spatula.tip_radius_mm) - 8.0 * along, rotation);
         ToolState { time_ms: ms, ..ToolState::at(pose) }
     };
-    let sample = |tick: u64| ToolSample { tick, state: at(tick as f64), tool: spatula, slot: SPATULA, drilling: false };
+    let sample = |tick: u64| ToolSample {
+        tick,
+        state: at(tick as f64),
+        tool: spatula,
+        slot: SPATULA,
+        drilling: false,
+        second: None,
+    };
     let codes = brain.class_of_tet.iter().map(|code| code - 1).collect();
     let (mut solver, mut frame, mut seq) = (solver(brain, codes)?, SoftFrame::default(), 0);
     let mut collision = CollisionStage::new(Program::Brain, &brain.mesh, &Default::default(), None)?;
