@@ -45,7 +45,7 @@ pub struct Row {
 }
 
 /// Measures of every session: what, place in the summary, unit.
-const MEASURES: [(&str, &str, &str); 8] = [
+const MEASURES: [(&str, &str, &str); 9] = [
     ("bone removed", "bone_removed_mm3", "mm³"),
     ("bone removed outside the plan", "plan.outside_plan_mm3", "mm³"),
     ("agreement with the plan (Dice)", "plan.dice", ""),
@@ -54,6 +54,7 @@ const MEASURES: [(&str, &str, &str); 8] = [
     ("largest force on the brain", "scores.peak_tissue_force_n", "N"),
     ("time of drilling", "scores.drilling_s", "s"),
     ("path of the tip", "scores.path_mm", "mm"),
+    ("blood lost", "bleeding.bled_ml", "ml"),
 ];
 /// Measures of a learning curve, by their place in [`MEASURES`].
 const CURVES: [usize; 3] = [2, 4, 6];

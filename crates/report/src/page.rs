@@ -236,8 +236,10 @@ pub fn rows(name: &str, file: &impl Serialize) -> Result<Vec<Row>, ReportError> 
 }
 
 /// Endings of names and their units; a longer ending comes before its own endings.
-const UNITS: [(&str, &str); 14] = [
+const UNITS: [(&str, &str); 16] = [
     ("_mm3", "mm³"),
+    ("_ml_per_min", "ml/min"),
+    ("_ml", "ml"),
     ("_n_s", "N s"),
     ("_n_ms_per_mm", "N ms/mm"),
     ("_mm", "mm"),
@@ -341,8 +343,15 @@ mod tests {
 
     #[test]
     fn a_path_names_its_unit() {
-        let units = ["scores.tissue_impulse_n_s", "tick_us.p50", "scores.bone_removed_mm3", "hand_force_n.max_step"];
-        assert_eq!(units.map(unit), ["N s", "µs", "mm³", "N"]);
+        let units = [
+            "scores.tissue_impulse_n_s",
+            "tick_us.p50",
+            "scores.bone_removed_mm3",
+            "hand_force_n.max_step",
+            "bleeding.bled_ml",
+            "bleeding.rate_ml_per_min",
+        ];
+        assert_eq!(units.map(unit), ["N s", "µs", "mm³", "N", "ml", "ml/min"]);
         assert_eq!(["hand_force_scale", "scores.peak_bone_force_n"].map(unit), ["", "N"]);
         assert_eq!(["scores.idle_s", "scores.tool_changes", "late_ticks"].map(unit), ["s", "", "ticks"]);
         assert_eq!(["fps", "guard.slewed", "second.guard.slewed"].map(unit), ["1/s", "ticks", "ticks"]);
