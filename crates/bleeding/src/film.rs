@@ -142,7 +142,11 @@ impl Film {
                 continue;
             }
             let mut moved = [0u64; 2];
-            for (edge, other) in border.beside(face).into_iter().enumerate().filter(|(_, other)| *other != NONE) {
+            for (edge, other) in border.beside(face).into_iter().enumerate() {
+                // One that went may still stand beside another that only touched its edge.
+                if !border.is_border(other) {
+                    continue;
+                }
                 let next = Place::of(border, positions, up, other);
                 let fall_mm =
                     (here.middle - next.middle).dot(up) + depth_mm - next.depth_mm(self.volumes[other as usize]);
@@ -150,7 +154,7 @@ impl Film {
                 let levels = LEVELS * fall_mm * here.level_mm2 * next.level_mm2 / (here.level_mm2 + next.level_mm2);
                 let mobile = LEVELS * mobile_mm * here.area_mm2;
                 let pl = PL * flux.min(levels).min(mobile);
-                if pl.is_nan() || pl < 1.0 {
+                if !fall_mm.is_finite() || pl.is_nan() || pl < 1.0 {
                     continue;
                 }
                 let flows = shares(there, (pl as u64).min(there[0] + there[1]));

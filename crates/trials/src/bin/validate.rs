@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{BufRead, BufReader, IsTerminal};
+use std::io::{BufRead, BufReader, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::mpsc;
@@ -151,7 +151,9 @@ fn run(asked: &Run) -> Result<bool> {
         jobs.retain(|_| at.next().is_some_and(|at: usize| at % of == number));
     }
     if asked.list {
-        jobs.iter().for_each(|job| println!("{}", job.key));
+        let mut out = std::io::stdout().lock();
+        // Whoever reads may have read enough.
+        let _enough = jobs.iter().try_for_each(|job| writeln!(out, "{}", job.key));
         return Ok(true);
     }
     let store = Store::open(&asked.out, scope)?;
