@@ -83,7 +83,7 @@ pub fn run(
                 if let Some(tissue) = replay.tissue.as_ref().filter(|_| film.is_none()) {
                     shown.write(|frame| tissue.solver.publish(frame));
                     if let Some(now) = tissue.collision.bleeds() {
-                        bleeding.write(|bleeding| bleeding.clone_from(now));
+                        bleeding.write(|bleeding| bleeding.copy_from(now));
                     }
                 }
             }

@@ -100,7 +100,7 @@ fn collision_loop(
             loads.fills.clone_from(&stage.loads().fills);
         });
         if let Some(now) = stage.bleeds() {
-            ends.bleeding.write(|bleeding| bleeding.clone_from(now));
+            ends.bleeding.write(|bleeding| bleeding.copy_from(now));
         }
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;

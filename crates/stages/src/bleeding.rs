@@ -37,6 +37,16 @@ pub struct Bleeding {
     pub stains: Vec<u8>,
 }
 
+impl Bleeding {
+    /// Takes another's state; does not allocate if there is room for its stains.
+    pub fn copy_from(&mut self, other: &Self) {
+        let &Self { bled_ml, sucked_ml, lies_ml, rinsed_ml, rate_ml_per_min, worst_ml_per_min, coagulated, .. } = other;
+        let mut stains = std::mem::take(&mut self.stains);
+        stains.clone_from(&other.stains);
+        *self = Self { bled_ml, sucked_ml, lies_ml, rinsed_ml, rate_ml_per_min, worst_ml_per_min, coagulated, stains };
+    }
+}
+
 /// The wound and its account.
 pub(crate) struct Bleeder {
     wound: Wound,

@@ -99,7 +99,7 @@ impl Shape {
     /// Takes what solver and collision published.
     pub fn follow(&mut self, inputs: &mut RenderInputs) {
         inputs.soft.iter_mut().for_each(|soft| self.take(soft.latest().0));
-        inputs.bleeding.iter_mut().for_each(|bleeding| self.bleeding.clone_from(bleeding.latest().0));
+        inputs.bleeding.iter_mut().for_each(|bleeding| self.bleeding.copy_from(bleeding.latest().0));
     }
 
     /// Takes what the solver published.
