@@ -142,11 +142,7 @@ impl Film {
                 continue;
             }
             let mut moved = [0u64; 2];
-            for (edge, other) in border.beside(face).into_iter().enumerate() {
-                // One that went may still stand beside another that only touched its edge.
-                if !border.is_border(other) {
-                    continue;
-                }
+            for (edge, other) in border.beside(face).into_iter().enumerate().filter(|(_, other)| *other != NONE) {
                 let next = Place::of(border, positions, up, other);
                 let fall_mm =
                     (here.middle - next.middle).dot(up) + depth_mm - next.depth_mm(self.volumes[other as usize]);
