@@ -1,6 +1,6 @@
 // The deformed brain's surface as triangles with smooth normals. Output 0: octahedral normal (xy),
 // 1 on a cut (z), distance along the ray in mm (w). Output 1: the rest position, for sampling the
-// MRI, and the stain (w): blood in mm, towards -1 a burn.
+// MRI, and the stain (w): blood in mm, towards -1 a burn, -2 dura.
 
 @group(0) @binding(1) var<storage, read> places: array<vec4f>;    // now, world mm, and the stain
 @group(0) @binding(2) var<storage, read> normals: array<vec4f>;   // now, unit

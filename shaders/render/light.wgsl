@@ -95,6 +95,16 @@ fn shade_bone(point: vec3f, along: vec3f, skull: vec4f) -> vec3f {
     return lit(colour, normal, along, fract(skull.z), past_tools(point) * floor(skull.z), 0.06 + 0.4 * wet);
 }
 
+fn wave(p: vec3f) -> f32 {
+    return abs(sin(p.x + 1.7 * sin(p.y) + 0.8 * sin(1.7 * p.z)));
+}
+
+// Colour of the dura: pale, with vessels that branch; by the place at rest, mm.
+fn dura_colour(rest: vec3f) -> vec3f {
+    let vessel = 1.0 - smoothstep(0.02, 0.10, min(wave(0.16 * rest), wave(0.29 * rest.yzx)));
+    return mix(vec3f(0.80, 0.68, 0.62), vec3f(0.55, 0.22, 0.22), 0.7 * vessel);
+}
+
 // Colour of tissue under blood or burnt, and how much of it the blood covers (w).
 fn stained(colour: vec3f, stain: f32) -> vec4f {
     let film = 1.0 - exp(-max(stain, 0.0) / 0.15);
@@ -112,6 +122,9 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, at_rest: vec4f) -> vec3
     if scene.forward.w > 0.0 {
         open = openness(g, normal);
         key *= select(1.0, 0.25, shadowed(g, normal, lift()));
+    }
+    if at_rest.w < -1.5 {
+        return lit(dura_colour(rest), select(normal, -normal, dot(normal, along) > 0.0), along, open, key, 0.25);
     }
     let colour = stained(painted_brain(brain_colour(rest - 3.5 * normal), rest), at_rest.w);
     return lit(colour.xyz, normal, along, open, key, 0.20 + 0.3 * colour.w);

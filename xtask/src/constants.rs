@@ -14,7 +14,7 @@ use std::fs;
 use std::path::Path;
 
 /// Crates whose constants are those of the program.
-const CRATES: &str = "bleeding bone budget contact deformable haptics models patient report rigid runtime simulator soft stages tled volume";
+const CRATES: &str = "bleeding bone budget contact deformable dura haptics models patient report rigid runtime simulator soft stages tled volume";
 
 /// Last words of the names of physical quantities.
 const QUANTITIES: [&str; 24] = [

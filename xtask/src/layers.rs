@@ -14,7 +14,7 @@ use std::process::Command;
 const FLOORS: [&[&str]; 12] = [
     &["geometry", "measurements", "shaders", "fixtures", "emulators"],
     &["volume", "bone", "mesh", "contact", "gpu"],
-    &["rigid", "deformable", "bleeding", "soft", "tled", "render", "haptics", "link"],
+    &["rigid", "deformable", "bleeding", "dura", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget", "window", "evidence", "stages", "rivals"],
     &["patient", "runtime"],
     &["models"],

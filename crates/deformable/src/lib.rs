@@ -33,7 +33,6 @@ mod seam;
 pub mod search;
 mod step;
 mod surface;
-mod triangle;
 mod wall;
 
 pub use bodies::{MeshCollision, NodeContact, push_apart, push_itself_apart};

@@ -20,9 +20,9 @@
 //! Cost: 3 ns for each node of a fitted box, 3 ns for each group of 16 clusters, 10 ns for each
 //! triangle near the tool. Triangles with a NaN corner are skipped.
 
-use crate::{bounded::push_bounded, extent::Extent, narrow::NONE, triangle};
+use crate::{bounded::push_bounded, extent::Extent, narrow::NONE};
 use glam::Vec3A;
-use trepan_geometry::Vec3;
+use trepan_geometry::{Vec3, closest_weights};
 use trepan_mesh::{Csr, FACES, Surface, TetMesh};
 
 /// Triangles in one cluster.
@@ -435,7 +435,7 @@ impl MovingSurface {
 
     fn foot(&self, positions: &[Vec3], t: u32, to: Vec3) -> Foot {
         let corners = self.corners(positions, t);
-        let weights = triangle::closest_weights(corners, to);
+        let weights = closest_weights(corners, to);
         let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
         Foot { triangle: t, weights, point, distance2: point.distance_squared(to) }
     }

@@ -22,6 +22,7 @@ mod motion;
 mod shell;
 mod statistics;
 mod tool;
+mod triangle;
 pub mod units;
 
 pub use aabb::Aabb;
@@ -31,3 +32,4 @@ pub use motion::{Buttons, ToolState, Twist, Wrench};
 pub use shell::{Pointshell, Spread};
 pub use statistics::quantile;
 pub use tool::{Tool, ToolKind};
+pub use triangle::closest_weights;

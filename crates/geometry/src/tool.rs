@@ -18,12 +18,22 @@ pub enum ToolKind {
     /// Forceps that coagulate bleeding tissue between their tips while the pedal is down, and
     /// rinse.
     Bipolar,
+    /// A short blade that incises the dura while its pedal is down.
+    Scalpel,
 }
 
 impl ToolKind {
     /// All kinds.
-    pub const ALL: [Self; 7] =
-        [Self::Burr, Self::Probe, Self::Perforator, Self::Craniotome, Self::Spatula, Self::Aspirator, Self::Bipolar];
+    pub const ALL: [Self; 8] = [
+        Self::Burr,
+        Self::Probe,
+        Self::Perforator,
+        Self::Craniotome,
+        Self::Spatula,
+        Self::Aspirator,
+        Self::Bipolar,
+        Self::Scalpel,
+    ];
 
     /// Whether it removes bone while the pedal is down.
     pub fn cuts(self) -> bool {
@@ -40,6 +50,7 @@ impl ToolKind {
             Self::Spatula => "spatula",
             Self::Aspirator => "aspirator",
             Self::Bipolar => "bipolar",
+            Self::Scalpel => "scalpel",
         }
     }
 }
@@ -109,5 +120,10 @@ impl Tool {
     /// Bipolar forceps, here closed: a rod of 2 mm with a round end.
     pub const fn bipolar() -> Self {
         Self { kind: ToolKind::Bipolar, shaft_radius_mm: 1.0, ..Self::probe(1.0) }
+    }
+
+    /// A scalpel with a pointed blade, here a thin rod with a round end of 1 mm.
+    pub const fn scalpel() -> Self {
+        Self { kind: ToolKind::Scalpel, shaft_radius_mm: 0.5, ..Self::probe(0.5) }
     }
 }

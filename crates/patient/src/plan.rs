@@ -47,6 +47,8 @@ pub struct Plan {
     pub outline: Vec<Rim>,
     /// The tumour, as a ball; `None` without one.
     pub target: Option<Target>,
+    /// Lines along which the dura is to be incised, world mm; none where it is open.
+    pub incisions: Vec<Vec<Vec3>>,
     /// The outline across the entry direction, from the site, mm.
     flat: Vec<Vec2>,
 }
@@ -58,7 +60,15 @@ impl Plan {
         let ring = |at: usize| Vec2::from_angle(at as f32 / RIMS as f32 * std::f32::consts::TAU) * flap_mm;
         match bone.filter(|_| flap_mm > 0.0) {
             Some(bone) => Self::around(bone, site, hole_mm, (0..RIMS).map(ring).collect()),
-            None => Some(Self { site, hole_mm, flap_mm: 0.0, outline: Vec::new(), target: None, flat: Vec::new() }),
+            None => Some(Self {
+                site,
+                hole_mm,
+                flap_mm: 0.0,
+                outline: Vec::new(),
+                target: None,
+                incisions: Vec::new(),
+                flat: Vec::new(),
+            }),
         }
     }
 
@@ -84,7 +94,7 @@ impl Plan {
         let place = |at: &Vec2| site.entry + across(&site) * at.extend(0.0);
         let outline = flat.iter().map(|at| rim(bone, place(at), site.inward)).collect::<Option<Vec<_>>>()?;
         let flap_mm = flat.iter().map(|at| at.length()).fold(0.0, f32::max);
-        Some(Self { site, hole_mm, flap_mm, outline, target: None, flat })
+        Some(Self { site, hole_mm, flap_mm, outline, target: None, incisions: Vec::new(), flat })
     }
 
     /// Distance of a place from the flap's outline across the entry direction, mm, negative inside;

@@ -1,6 +1,6 @@
 //! The boundary of the deformed tetrahedra with smooth normals.
 
-use crate::RenderError;
+use crate::{Leaves, RenderError};
 use glam::Vec3;
 use trepan_mesh::{Surface, TetMesh};
 
@@ -24,9 +24,16 @@ pub(crate) struct Border {
     pub places: Vec<Vec3>,
     /// Current unit normals of boundary nodes.
     pub normals: Vec<Vec3>,
-    /// Blood on boundary nodes, mm; -1 for a burn.
+    /// Blood on boundary nodes, mm; -1 for a burn, [`DURA`] on the dura.
     pub stains: Vec<f32>,
+    /// The brain's own triangles, before those of the dura.
+    own: usize,
+    /// The dura's nodes at rest, world mm.
+    leaves: Vec<Vec3>,
 }
+
+/// Stain of the dura.
+pub(crate) const DURA: f32 = -2.0;
 
 impl Border {
     pub fn of(mesh: &TetMesh) -> Self {
@@ -39,7 +46,8 @@ impl Border {
         let (normals, stains) = (vec![Vec3::ZERO; nodes.len()], vec![0.0; nodes.len()]);
         let (rest, now) = (mesh.positions.clone(), mesh.positions.clone());
         let (tets, all) = (mesh.tets.clone(), mesh.tets.clone());
-        Self { nodes, triangles, tets, all, gone: Vec::new(), rest, now, places, normals, stains }
+        let (own, gone, leaves) = (triangles.len(), Vec::new(), Vec::new());
+        Self { nodes, triangles, tets, all, gone, rest, now, places, normals, stains, own, leaves }
     }
 
     /// Shows the mesh without the tetrahedra that are `gone`, or all of it; returns whether that
@@ -54,6 +62,30 @@ impl Border {
         let (all, mesh) = (std::mem::take(&mut self.all), TetMesh { positions: std::mem::take(&mut self.rest), tets });
         *self = Self { all, gone: gone.to_vec(), ..Self::of(&mesh) };
         true
+    }
+
+    /// Covers the brain by the dura; returns whether other triangles are there than before.
+    pub fn cover(&mut self, dura: Option<&Leaves>) -> Result<bool, RenderError> {
+        let none = Leaves { rest: &[], places: &[], triangles: &[] };
+        let Leaves { rest, places, triangles } = dura.unwrap_or(&none);
+        let (wanted, given) = (rest.len(), places.len());
+        if given != wanted || triangles.iter().flatten().any(|&n| n as usize >= wanted) {
+            return Err(RenderError::Nodes { wanted, given });
+        }
+        let first = self.nodes.len() as u32;
+        let moved = triangles.iter().map(|corners| corners.map(|n| n + first));
+        let is_other = wanted != self.leaves.len() || !self.triangles[self.own..].iter().copied().eq(moved.clone());
+        if is_other {
+            self.triangles.truncate(self.own);
+            self.triangles.extend(moved);
+            self.places.resize(self.nodes.len() + wanted, Vec3::ZERO);
+            self.normals.resize(self.places.len(), Vec3::ZERO);
+            self.stains.resize(self.places.len(), DURA);
+        }
+        self.leaves.clear();
+        self.leaves.extend_from_slice(rest);
+        self.places[self.nodes.len()..].copy_from_slice(places);
+        Ok(is_other)
     }
 
     /// Updates the boundary from the mesh's nodes, or resets it to rest.
@@ -78,7 +110,10 @@ impl Border {
 
     /// Rest position of a boundary node, world mm.
     pub fn at_rest(&self, node: u32) -> Vec3 {
-        self.rest[self.nodes[node as usize] as usize]
+        match self.nodes.get(node as usize) {
+            Some(&own) => self.rest[own as usize],
+            None => self.leaves[node as usize - self.nodes.len()],
+        }
     }
 
     /// The current boundary triangles.

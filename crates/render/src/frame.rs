@@ -64,6 +64,8 @@ pub struct Frame<'a> {
     /// Stain of each node of the brain: blood of 0 to 2 mm as 0 to 200, 255 for a burn; `None` for
     /// none.
     pub brain_stains: Option<&'a [u8]>,
+    /// The dura over the brain; `None` where it is away.
+    pub dura: Option<Leaves<'a>>,
     /// Whether the skull is shown in the 3-D view.
     pub show_bone: bool,
     /// Whether the brain is shown in the 3-D view.
@@ -80,6 +82,17 @@ pub struct Frame<'a> {
     pub stereo: Option<Stereo>,
     /// Grey values of the slices.
     pub slices: SliceLook,
+}
+
+/// A sheet over the brain, such as the dura with its leaves.
+#[derive(Clone, Copy, Debug)]
+pub struct Leaves<'a> {
+    /// Where each node was at rest, world mm: its pattern moves with it.
+    pub rest: &'a [Vec3],
+    /// Where each node is, world mm, as many.
+    pub places: &'a [Vec3],
+    /// Triangles over the nodes.
+    pub triangles: &'a [[u32; 3]],
 }
 
 /// Appearance of the slices.
@@ -136,6 +149,7 @@ impl Frame<'_> {
             brain_positions: None,
             brain_gone: None,
             brain_stains: None,
+            dura: None,
             show_bone: true,
             show_brain: true,
             bone_paint: None,

@@ -54,7 +54,7 @@ pub use camera::{Camera, View};
 pub use cut::Cut;
 pub use device::Renderer;
 pub use error::RenderError;
-pub use frame::{Frame, SceneData, SliceLook};
+pub use frame::{Frame, Leaves, SceneData, SliceLook};
 pub use image::Image;
 pub use layout::Layout;
 pub use overlap::{RgbPicture, overlap_pictures};

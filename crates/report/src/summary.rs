@@ -11,12 +11,12 @@ use trepan_contact::GuardCounters;
 use trepan_patient::Plan;
 use trepan_patient::PlanComparison;
 use trepan_runtime::{Outcome, Quantiles, Replayed, SolverOutcome};
-use trepan_stages::Bleeding;
 use trepan_stages::alarms::REAL_TIME;
 use trepan_stages::by_cause;
 use trepan_stages::notice::{Notice, What};
 use trepan_stages::score::ScoreKeeper;
 use trepan_stages::second_hand::SecondOutcome;
+use trepan_stages::{Bleeding, DuraState};
 
 /// The whole file.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -73,6 +73,8 @@ pub struct Summary {
     pub resection: Option<Resection>,
     /// How the wound bled; `null` if it did not.
     pub bleeding: Option<Bleeding>,
+    /// What was done to the dura; `null` where it is not to be incised.
+    pub dura: Option<DuraState>,
     /// Voxels of `removed-label.nii.gz`; `null` without bone.
     pub removed_label: Option<RemovedLabel>,
     /// Pieces of bone cut off the skull, such as a flap, at the end.
@@ -307,6 +309,7 @@ impl Summary {
             .filter(|_| outcome.replayed.is_none())
             .filter_map(|solver| behind(solver.real_time_factor));
         let solver_faults = outcome.solver.iter().flat_map(|solver| solver.solver_faults.remarks());
+        let wound = outcome.solver.as_ref().map(|solver| &solver.wound);
         let remarks = slow.into_iter().chain(behind).chain(self.remarks).chain(outcome.remarks.iter().cloned());
         Self {
             phases: phases(outcome),
@@ -324,7 +327,8 @@ impl Summary {
             },
             hand_force_scale: outcome.force_scale,
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
-            bleeding: outcome.solver.as_ref().and_then(|s| s.bleeding.clone()).filter(|b| b.bled_ml > 0.0),
+            bleeding: wound.map(|wound| wound.bleeding.clone()).filter(|b| b.bled_ml > 0.0),
+            dura: wound.map(|wound| wound.dura.clone()).filter(|dura| !dura.places.is_empty()),
             cut_off: self.cut_off.with_lifted(&outcome.written.notices),
             warnings: warnings(outcome),
             scores: outcome.scores,

@@ -38,8 +38,7 @@ use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::wire::TickRecord;
 use trepan_link::{Recorder, SceneWriter};
 use trepan_soft::Loads;
-use trepan_stages::Bleeding;
-use trepan_stages::collision_step::{CollisionStage, SoftFrame};
+use trepan_stages::collision_step::{CollisionStage, SoftFrame, Wound};
 use trepan_stages::flap::FlapPlace;
 use trepan_stages::force_scale::ForceScale;
 use trepan_stages::haptic_tick::{HapticStage, Tick, ToolSample};
@@ -176,8 +175,8 @@ pub struct RenderInputs {
     pub view: Reader<View>,
     /// Newest state of the brain, where it deforms.
     pub soft: Option<Reader<SoftFrame>>,
-    /// How the wound bleeds now.
-    pub bleeding: Option<Reader<Bleeding>>,
+    /// How the wound bleeds now, and how the dura lies.
+    pub wound: Option<Reader<Wound>>,
     /// Film of a replay in a window.
     pub film: Option<Receiver<Shot>>,
 }
@@ -200,7 +199,7 @@ pub struct Cells {
     /// Solver loop to rendering.
     pub shown: (Writer<SoftFrame>, Reader<SoftFrame>),
     /// Collision loop to rendering.
-    pub bleeding: (Writer<Bleeding>, Reader<Bleeding>),
+    pub wound: (Writer<Wound>, Reader<Wound>),
     /// Haptic loop to the film.
     pub filmed: (Writer<View>, Reader<View>),
     /// Solver loop to the film.
@@ -215,7 +214,7 @@ impl Cells {
             tissue.solver.publish(&mut frame);
         }
         let loads = Loads { contacts: NodalContacts::with_room(), fills: frame.fills.clone(), ..Loads::default() };
-        let bleeding = stages.tissue.as_ref().and_then(|tissue| tissue.collision.bleeds().cloned()).unwrap_or_default();
+        let wound = stages.tissue.as_ref().map(|tissue| tissue.collision.wound().clone()).unwrap_or_default();
         let view = View::at(sample, stages.haptic.guard().config().max_force_n);
         Self {
             tool: cell(sample),
@@ -223,7 +222,7 @@ impl Cells {
             patch: cell((0, SurfacePatch::default())),
             loads: cell((0, loads)),
             soft: cell(frame.clone()),
-            bleeding: cell(bleeding),
+            wound: cell(wound),
             filmed: cell(view),
             filmed_soft: cell(frame.clone()),
             shown: cell(frame),
@@ -373,9 +372,9 @@ pub struct SolverOutcome {
     /// What is left of each tetrahedron, of 65535; empty where nothing could be resected.
     #[serde(skip)]
     pub fills: Vec<u16>,
-    /// How the wound bled at the end; `None` where nothing can.
+    /// The wound at the end.
     #[serde(skip)]
-    pub bleeding: Option<Bleeding>,
+    pub wound: Wound,
 }
 
 impl SolverOutcome {

@@ -61,10 +61,10 @@ pub fn run(
     let shots = film.is_some().then_some(shots);
     let mut film = film;
     let soft = stages.tissue.is_some().then_some(cells.shown.1);
-    let inputs = RenderInputs { view: cells.view.1, soft, bleeding: Some(cells.bleeding.1), film: shots };
+    let inputs = RenderInputs { view: cells.view.1, soft, wound: Some(cells.wound.1), film: shots };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
-        let (mut view, mut shown, mut bleeding) = (cells.view.0, cells.shown.0, cells.bleeding.0);
+        let (mut view, mut shown, mut wound) = (cells.view.0, cells.shown.0, cells.wound.0);
         let replaying = scope.spawn(move || {
             let mut replay = Replay::new(stages, recording, senders, start);
             let ticks = up_to(recording, end_ms);
@@ -82,9 +82,7 @@ pub fn run(
                 film.take_if(|_| shot.is_some_and(|shot| sender.send(shot).is_err()));
                 if let Some(tissue) = replay.tissue.as_ref().filter(|_| film.is_none()) {
                     shown.write(|frame| tissue.solver.publish(frame));
-                    if let Some(now) = tissue.collision.bleeds() {
-                        bleeding.write(|bleeding| bleeding.copy_from(now));
-                    }
+                    wound.write(|wound| wound.copy_from(tissue.collision.wound()));
                 }
             }
             if film.is_none() {
@@ -298,7 +296,7 @@ impl<'a> Replay<'a> {
         let solver = self.tissue.as_ref().map(|tissue| SolverOutcome {
             times: self.step_times,
             collision_times: self.collision_times,
-            bleeding: tissue.collision.bleeds().cloned(),
+            wound: tissue.collision.wound().clone(),
             real_time_factor: last.map_or(0.0, |t| tissue.solver.time_ms() / t.time_ms.max(1e-3)),
             ..SolverOutcome::of(&tissue.solver)
         });

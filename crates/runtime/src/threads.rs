@@ -26,9 +26,10 @@ use trepan_link::queue::Sender;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_soft::Loads;
 use trepan_stages::alarms;
+use trepan_stages::collision_step::Wound;
 use trepan_stages::haptic_tick::{HapticStage, Tick, TickInput};
 use trepan_stages::second_hand::{SecondHand, SecondView};
-use trepan_stages::{Bleeding, CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
+use trepan_stages::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 
 /// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;
@@ -83,7 +84,7 @@ fn collision_loop(
     clock: Clock,
     pace: Pace,
     stop: &Stop,
-) -> (Times, Option<Bleeding>) {
+) -> (Times, Wound) {
     let _ = real_time(60, "collision");
     let mut times = Times::default();
     let mut schedule = Schedule::new(pace.collision_ms.into(), clock.now_ms());
@@ -99,16 +100,14 @@ fn collision_loop(
             loads.contacts.copy_from(&stage.loads().contacts);
             loads.fills.clone_from(&stage.loads().fills);
         });
-        if let Some(now) = stage.bleeds() {
-            ends.bleeding.write(|bleeding| bleeding.copy_from(now));
-        }
+        ends.wound.write(|wound| wound.copy_from(stage.wound()));
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;
         times.add_us(record.compute_us);
         ends.records.send(record);
         schedule.advance(done_ms);
     }
-    (times, stage.bleeds().cloned())
+    (times, stage.wound().clone())
 }
 
 /// The solver loop: simulated time follows wall time; a lag over [`LAG_MS`] is skipped. After two
@@ -169,7 +168,7 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
     let inputs = RenderInputs {
         view: cells.view.1,
         soft: tissue.is_some().then_some(cells.shown.1),
-        bleeding: Some(cells.bleeding.1),
+        wound: Some(cells.wound.1),
         film: None,
     };
     thread::scope(|scope| {
@@ -181,8 +180,8 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
         let feeling = scope.spawn(move || haptic_loop(hands, ends, clock, pace, stop));
         let solving = tissue.map(|tissue| {
             let (tool, soft, patch, loads) = (cells.tool.1, cells.soft.1, cells.patch.0, cells.loads.0);
-            let bleeding = cells.bleeding.0;
-            let ends = CollisionEnds { tool, soft, patch, loads, bleeding, records: collisions };
+            let wound = cells.wound.0;
+            let ends = CollisionEnds { tool, soft, patch, loads, wound, records: collisions };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
             let (soft, shown, filmed) = (cells.soft.0, cells.shown.0, cells.filmed_soft.0);
             let ends = SolverEnds { loads: cells.loads.1, soft, shown, filmed, records: solver };
@@ -195,8 +194,8 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
         outcome.remarks.extend(filming.and_then(|filming| filming.join().ok().flatten()));
         let solver = solving.map(|(colliding, solving)| {
             let solver = solving.join().unwrap_or_default();
-            let (collision_times, bleeding) = colliding.join().unwrap_or_default();
-            SolverOutcome { collision_times, bleeding, ..solver }
+            let (collision_times, wound) = colliding.join().unwrap_or_default();
+            SolverOutcome { collision_times, wound, ..solver }
         });
         Outcome { solver, written: writing.join().unwrap_or_default(), ..outcome }
     })
@@ -303,7 +302,7 @@ struct CollisionEnds {
     soft: Reader<SoftFrame>,
     patch: Writer<Numbered<SurfacePatch>>,
     loads: Writer<Numbered<Loads>>,
-    bleeding: Writer<Bleeding>,
+    wound: Writer<Wound>,
     records: Sender<CollisionRecord>,
 }
 

@@ -84,14 +84,17 @@ fn refused(fault: impl std::fmt::Display) -> SessionError {
 }
 
 /// Duration of a scripted operation, s: of one that cuts a flap, of a resection by what it takes,
-/// of others.
+/// of others. An incision of the dura adds to the last.
 fn script_s(name: &str, plan: &Plan) -> f64 {
+    let incises_s = if plan.incisions.is_empty() { 0.0 } else { 40.0 };
     match (name, plan.target) {
         ("flap", _) => 75.0,
-        ("bleed", _) => 150.0,
+        ("bleed", _) => 150.0 + incises_s,
         ("resect", target) => {
-            60.0 + target
-                .map_or(60.0, |target| f64::from(target.radius_mm).powi(2) * (0.43 * f64::from(target.radius_mm) + 2.0))
+            60.0 + incises_s
+                + target.map_or(60.0, |target| {
+                    f64::from(target.radius_mm).powi(2) * (0.43 * f64::from(target.radius_mm) + 2.0)
+                })
         }
         _ => 20.0,
     }
@@ -102,6 +105,7 @@ fn scripted(name: &str, program: Program, options: &Options, plan: &Plan) -> Res
     let usual = if program.has_tissue() { script::Plan::default() } else { script::Plan::of_bone() };
     let how =
         script::Plan { outline: plan.outline.clone(), is_open: !program.has_bone(), target: plan.target, ..usual };
+    let how = script::Plan { incisions: plan.incisions.clone(), ..how };
     Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(script_s(name, plan)), &how)
 }
 

@@ -41,6 +41,10 @@ pub(crate) struct Operation {
     pub aspiration_mm_s: f32,
     /// Bleeding of cut tissue over the usual; 0 for none.
     pub bleeding: f32,
+    /// Whether the dura is closed and is to be incised; `None`: where there is a tumour. Recordings
+    /// of versions without it had it open.
+    #[serde(default = "opens_by_itself")]
+    pub dura: Option<bool>,
     /// Made tumour: its radius, mm, after its centre, RAS mm, if that is given; empty without one.
     pub tumour: Vec<f32>,
     /// Haptic tick rate, Hz.
@@ -49,6 +53,10 @@ pub(crate) struct Operation {
     pub opening_needed: bool,
     /// Whether force stays off after a device fault until the user acts; false for a watcher.
     pub force_waits: bool,
+}
+
+fn opens_by_itself() -> Option<bool> {
+    Some(false)
 }
 
 impl Default for Operation {
@@ -62,6 +70,7 @@ impl Default for Operation {
             young_modulus_kpa: YOUNG_KPA,
             aspiration_mm_s: ASPIRATION_MM_S,
             bleeding: 1.0,
+            dura: None,
             tumour: Vec::new(),
             rate_hz: RATE_HZ,
             opening_needed: true,
@@ -106,6 +115,7 @@ impl Operation {
             young_modulus_kpa: options.young_modulus_kpa.unwrap_or(base.young_modulus_kpa),
             aspiration_mm_s: options.aspiration.unwrap_or(base.aspiration_mm_s),
             bleeding: options.bleeding.unwrap_or(base.bleeding),
+            dura: options.dura.or(base.dura),
             tumour,
             rate_hz: options.rate_hz.unwrap_or(base.rate_hz),
             opening_needed: base.opening_needed && !watches,
@@ -130,7 +140,7 @@ mod tests {
         let usual = Operation::of(&parse("x"), &DeviceName::MOUSE, None);
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, None, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
-        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --aspiration 0.5 --bleeding 2 --tumour 1,2,3,4 --rate-hz 500 --watch other";
+        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --csf-speed-up 10 --young-modulus-kpa 6 --aspiration 0.5 --bleeding 2 --dura closed --tumour 1,2,3,4 --rate-hz 500 --watch other";
         let drawn = Options { flap_line: vec![[1.5, -2.0, 0.1], [3.0, 4.0, 5.0]], ..parse(line) };
         let given = Operation::of(&drawn, &script, None);
         assert!(!given.opening_needed && usual.opening_needed && usual.force_waits);

@@ -162,6 +162,9 @@ pub struct Options {
     /// Bleeding over the usual, 0 to 20 [default: 1, uncalibrated]
     #[arg(help_heading = "Models and accuracy", long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub bleeding: Option<f32>,
+    /// The dura: closed, to be incised, or open [default: closed where a skull covers a tumour]
+    #[arg(help_heading = "Session", long, value_name = "STATE", value_parser = closed)]
+    pub dura: Option<bool>,
     /// Tissue classes (as for --tissue) that raise a warning when a tool comes close, separated by
     /// commas [default: vessel]
     #[arg(help_heading = "Session", long, value_name = "CLASS,...", value_delimiter = ',')]
@@ -494,6 +497,14 @@ fn tumour(text: &str) -> Result<MadeTumour, String> {
 fn quality(text: &str) -> Result<Quality, String> {
     let names = || Quality::ALL.map(Quality::name).join(", ");
     Quality::ALL.into_iter().find(|known| known.name() == text).ok_or_else(|| format!("give one of {}", names()))
+}
+
+fn closed(text: &str) -> Result<bool, String> {
+    match text {
+        "closed" => Ok(true),
+        "open" => Ok(false),
+        _ => Err("expected closed or open".into()),
+    }
 }
 
 fn shard(text: &str) -> Result<(usize, usize), String> {

@@ -139,8 +139,8 @@ fn operated_by(hand: fn(u64) -> ToolState, line: &str, cheaper_from: u64) -> (Re
     assert_eq!((faults.contacts_left_out, faults.restless_steps), (0, 0), "{line}");
     let config = setup.models.config(setup.ingredients());
     recording.header.config = SessionConfig { operation: setup.operation.clone(), ..config }.entries();
-    let bleeding = tissue.collision.bleeds().cloned();
-    (recording, setup, SolverOutcome { bleeding, ..SolverOutcome::of(&tissue.solver) })
+    let wound = tissue.collision.wound().clone();
+    (recording, setup, SolverOutcome { wound, ..SolverOutcome::of(&tissue.solver) })
 }
 
 /// Ticks that give the same force when the recording is replayed by its header.
@@ -273,16 +273,16 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
 #[test]
 fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
     let line = "--set element=locking-free --aspiration 50 --bleeding 20";
-    let (recording, setup, SolverOutcome { fills, bleeding, .. }) = operated_by(aspirating, line, 1100);
+    let (recording, setup, SolverOutcome { fills, wound, .. }) = operated_by(aspirating, line, 1100);
     let resection = setup.resection(&fills).unwrap();
     let names: Vec<&str> = resection.tissues.keys().map(String::as_str).collect();
     assert!(resection.healthy_mm3 > 30.0 && names == ["brain", "grey"], "{resection:?}");
     assert_eq!(resection.tumour_share, 0.0, "there is none");
     assert!(fills.iter().any(|fill| (1..u16::MAX).contains(fill)));
-    let bled = bleeding.as_ref().unwrap();
+    let bled = &wound.bleeding;
     assert!(bled.bled_ml > 1e-3 && bled.sucked_ml > 0.0 && bled.stains.iter().any(|stain| *stain > 0), "{bled:?}");
     let again = again(&recording).0;
-    let same = again.solver.unwrap().bleeding.unwrap();
+    let same = again.solver.unwrap().wound.bleeding;
     // No tick heard of the last collision step.
     assert_eq!((same.bled_ml, same.sucked_ml, &same.stains), (bled.bled_ml, bled.sucked_ml, &bled.stains));
     assert_eq!(again.replayed.unwrap().identical, END - 1);

@@ -7,6 +7,7 @@ use crate::operation::Operation;
 use std::sync::{Arc, OnceLock};
 use trepan_bone::{BoneVolume, Piece};
 use trepan_budget::Bone;
+use trepan_dura::Dura;
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_haptics::script::Target;
 use trepan_link::Recording;
@@ -36,6 +37,12 @@ use trepan_voxel_size::{CostModel, Measures};
 
 /// How far a tumour sinks over what the cortex does, in the built-in case, numerical.
 const SINKS: f32 = 0.7;
+
+/// How far the dura is modelled beyond the planned opening, mm, numerical.
+const AROUND_MM: f32 = 8.0;
+/// Share of the opening's radius that is incised, and parts of an incision, numerical.
+const INCISED: f32 = 0.85;
+const INCISION_PARTS: u8 = 10;
 
 /// Patient, plan, settings and models of a session.
 pub(crate) struct SessionSetup {
@@ -86,6 +93,11 @@ impl SessionSetup {
         if let Some(target) = setup.plan.target.as_mut().filter(|_| anchored) {
             target.sinks_mm = SINKS * shift::LANDMARKS_END.f32() * loss / usual.f32();
         }
+        let closed = setup.operation.dura.unwrap_or(setup.plan.target.is_some());
+        if let Some((dura, radius_mm)) = setup.dura().filter(|_| closed) {
+            setup.plan.incisions = dura.cross(INCISED * radius_mm, INCISION_PARTS).into();
+        }
+        setup.operation.dura = Some(!setup.plan.incisions.is_empty());
         Ok(setup)
     }
 
@@ -233,6 +245,11 @@ impl SessionSetup {
             .under_pressure(with.surface_pressure_mmhg > 0.0)
             .turning(rigid.descriptor().extent == Extent::BallAndShaft)
             .settling(settling);
+        let dura = self.dura().filter(|_| self.operation.dura == Some(true));
+        let collision = match self.bone().zip(dura) {
+            Some((bone, (dura, _))) => collision.covered(dura, Arc::clone(bone)),
+            None => collision,
+        };
         let solver = SolverStage::new(solver);
         let rates = self.aspiration_rates(brain, with);
         if rates.is_empty() {
@@ -244,6 +261,14 @@ impl SessionSetup {
             false => collision,
         };
         Ok(Tissue { collision, solver: solver.resectable(rates.len()) })
+    }
+
+    /// The dura around the planned opening in a skull, and the radius of the opening, mm.
+    fn dura(&self) -> Option<(Dura, f32)> {
+        let Plan { site, flap_mm, hole_mm, .. } = self.plan;
+        let (_, brain) = self.bone().zip(self.brain())?;
+        let radius_mm = flap_mm.max(hole_mm);
+        Dura::over(&brain.mesh, site.entry, -site.inward, radius_mm + AROUND_MM).map(|dura| (dura, radius_mm))
     }
 
     /// Rate at which an aspirator takes each tetrahedron, mm/ms, by its stiffness against that of

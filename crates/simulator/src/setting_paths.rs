@@ -12,7 +12,7 @@ use std::fs;
 use trepan_models::ingredients::{Ingredients, KEYS, setting};
 
 /// Paths outside `ingredients`, each with its flag.
-const FLAGS: [(&str, &str); 14] = [
+const FLAGS: [(&str, &str); 15] = [
     ("quality", "--quality"),
     ("sizes.spacing_mm", "--spacing-mm"),
     ("sizes.tets", "--tets"),
@@ -24,6 +24,7 @@ const FLAGS: [(&str, &str); 14] = [
     ("operation.young_modulus_kpa", "--young-modulus-kpa"),
     ("operation.aspiration_mm_s", "--aspiration"),
     ("operation.bleeding", "--bleeding"),
+    ("operation.dura", "--dura"),
     ("operation.rate_hz", "--rate-hz"),
     ("device.scale", "--device-scale"),
     ("device.force_scale", "--force-scale"),

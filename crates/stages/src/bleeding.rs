@@ -52,17 +52,21 @@ pub(crate) struct Bleeder {
     wound: Wound,
     /// Against gravity, a unit vector.
     up: Vec3,
-    pub now: Bleeding,
 }
 
 impl Bleeder {
     pub fn of(mesh: &TetMesh, perfusion: &[Perfusion], up: Vec3) -> Self {
-        let now = Bleeding { stains: vec![0; mesh.positions.len()], ..Bleeding::default() };
-        Self { wound: Wound::of(mesh, perfusion), up, now }
+        Self { wound: Wound::of(mesh, perfusion), up }
     }
 
-    /// Takes tetrahedra away, and goes on to the tool's time.
-    pub fn step(&mut self, sample: &ToolSample, positions: &[Vec3], gone: impl Iterator<Item = u32>) {
+    /// Takes tetrahedra away, goes on to the tool's time, and keeps account.
+    pub fn step(
+        &mut self,
+        sample: &ToolSample,
+        positions: &[Vec3],
+        gone: impl Iterator<Item = u32>,
+        now: &mut Bleeding,
+    ) {
         let now_ms = sample.state.time_ms;
         gone.for_each(|tet| self.wound.remove(tet, positions, now_ms));
         let hands = [Some((sample.tool, sample.state)), sample.second.map(|state| (SecondHand::tool(), state))];
@@ -79,7 +83,6 @@ impl Bleeder {
         let (account, lies) = (self.wound.account(), self.wound.lies_pl());
         let ml = |pl: u64| pl as f64 / PL_PER_ML;
         let rate = self.wound.rate_ml_per_min(now_ms);
-        let now = &mut self.now;
         (now.bled_ml, now.rinsed_ml) = (ml(account.came[0]), ml(account.came[1]));
         (now.sucked_ml, now.lies_ml) = (ml(account.sucked[0]), ml(lies[0]));
         (now.rate_ml_per_min, now.worst_ml_per_min) = (rate, now.worst_ml_per_min.max(rate));
@@ -105,15 +108,16 @@ mod tests {
         let at = |place: Vec3, buttons: Buttons| ToolState { buttons, ..ToolState::at(Pose::from_translation(place)) };
         let sucked_ml = |second: Option<ToolState>| {
             let mut bleeder = Bleeder::of(&mesh, &vec![brain; mesh.tets.len()], Vec3::Z);
+            let mut now = Bleeding { stains: vec![0; mesh.positions.len()], ..Bleeding::default() };
             for tick in 1..2000 {
                 let mut state = at(top + 30.0 * Vec3::Z, Buttons::PEDAL);
                 state.time_ms = tick as f64;
                 let sample = ToolSample { tick, state, tool: Tool::bipolar(), slot: 0, drilling: false, second };
                 let gone = hole.iter().copied().filter(|_| tick == 1);
-                bleeder.step(&sample, &mesh.positions, gone);
+                bleeder.step(&sample, &mesh.positions, gone, &mut now);
             }
-            assert!(bleeder.now.bled_ml > 0.1 && bleeder.now.coagulated == 0, "{:?}", bleeder.now.bled_ml);
-            bleeder.now.sucked_ml
+            assert!(now.bled_ml > 0.1 && now.coagulated == 0, "{:?}", now.bled_ml);
+            now.sucked_ml
         };
         assert_eq!(sucked_ml(None), 0.0);
         assert_eq!(sucked_ml(Some(at(top, Buttons(0)))), 0.0, "its pedal is up");

@@ -10,14 +10,18 @@
 
 use crate::aspirator::Aspirator;
 use crate::bleeding::{Bleeder, Bleeding};
+use crate::dura::{DuraState, Membrane};
 use crate::haptic_tick::ToolSample;
 use crate::program::{Phase, Program};
 use crate::settling::Settling;
 use crate::skull_wall::SkullWall;
+use std::sync::Arc;
 use trepan_bleeding::Perfusion;
+use trepan_bone::BoneVolume;
 use trepan_contact::{MAX_SPRINGS, NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, MeshCollision, NodeContact, TissueCollision, TissueStep};
-use trepan_geometry::{Tool, Vec3};
+use trepan_dura::Dura;
+use trepan_geometry::{Buttons, Tool, Vec3};
 use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
 use trepan_soft::Loads;
@@ -30,8 +34,10 @@ impl CollisionStage {
         if !self.with_torque {
             self.patch.couple_mm = Vec3::ZERO;
         }
+        let is_open = self.meet_dura(sample, soft);
         self.aspirate(sample, soft);
-        self.settling.load(sample.phase(), sample.state.time_ms, &mut self.loads);
+        let phase = if is_open { sample.phase() } else { Phase::Craniotomy };
+        self.settling.load(phase, sample.state.time_ms, &mut self.loads);
         self.press(sample.phase(), soft);
         self.seq += 1;
         CollisionRecord {
@@ -44,16 +50,29 @@ impl CollisionStage {
         }
     }
 
+    /// Lets the tool meet the dura; returns whether that is open.
+    fn meet_dura(&mut self, sample: &ToolSample, soft: &SoftFrame) -> bool {
+        self.dura.as_mut().is_none_or(|dura| {
+            dura.step(sample, &soft.positions, &mut self.patch, &mut self.wound.dura);
+            dura.is_open()
+        })
+    }
+
     /// Takes tissue away that an aspirator touches; contact feels that from the next step on.
     fn aspirate(&mut self, sample: &ToolSample, soft: &SoftFrame) {
         let Some(aspirator) = &mut self.aspirator else { return };
+        let mut sample = *sample;
+        if self.dura.as_ref().is_some_and(Membrane::bears) {
+            sample.state.buttons.0 &= !Buttons::PEDAL.0;
+        }
+        let sample = &sample;
         aspirator.step(sample, &self.tools[sample.slot], &mut self.loads.fills);
         for tool in &mut self.tools {
             aspirator.thinned.iter().for_each(|&tet| tool.thin(tet, self.loads.fills[tet as usize]));
         }
         if let Some(bleeder) = &mut self.bleeder {
             let gone = aspirator.thinned.iter().copied().filter(|&tet| self.loads.fills[tet as usize] == 0);
-            bleeder.step(sample, &soft.positions, gone);
+            bleeder.step(sample, &soft.positions, gone, &mut self.wound.bleeding);
         }
     }
 
@@ -69,6 +88,23 @@ impl CollisionStage {
         if let Some(folds) = self.folds.as_mut().filter(|_| self.settling.is_open()) {
             folds.press(&soft.positions, &mut self.loads.contacts);
         }
+    }
+}
+
+/// The wound as pictures and report show it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wound {
+    /// How it bleeds.
+    pub bleeding: Bleeding,
+    /// The dura over it.
+    pub dura: DuraState,
+}
+
+impl Wound {
+    /// Takes another's state; does not allocate if there is room.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.bleeding.copy_from(&other.bleeding);
+        self.dura.copy_from(&other.dura);
     }
 }
 
@@ -120,6 +156,8 @@ pub struct CollisionStage {
     settling: Settling,
     aspirator: Option<Aspirator>,
     bleeder: Option<Bleeder>,
+    dura: Option<Membrane>,
+    wound: Wound,
     patch: SurfacePatch,
     loads: Loads,
     step: TissueStep,
@@ -158,6 +196,8 @@ impl CollisionStage {
             settling: Settling::default(),
             aspirator: None,
             bleeder: None,
+            dura: None,
+            wound: Wound::default(),
             loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
             step: TissueStep::default(),
             seq: 0,
@@ -202,12 +242,21 @@ impl CollisionStage {
     /// Lets what is aspirated bleed, by the perfusion of each tetrahedron; `up` is the unit vector
     /// against gravity. Without an aspirator nothing bleeds.
     pub fn bleeding(self, mesh: &TetMesh, perfusion: &[Perfusion], up: Vec3) -> Self {
-        Self { bleeder: Some(Bleeder::of(mesh, perfusion, up)), ..self }
+        let bleeding = Bleeding { stains: vec![0; mesh.positions.len()], ..Bleeding::default() };
+        let wound = Wound { bleeding, ..self.wound };
+        Self { bleeder: Some(Bleeder::of(mesh, perfusion, up)), wound, ..self }
     }
 
-    /// How the wound bleeds; `None` where nothing can.
-    pub fn bleeds(&self) -> Option<&Bleeding> {
-        self.bleeder.as_ref().map(|bleeder| &bleeder.now)
+    /// Covers the brain by a dura that is to be incised; bone holds it.
+    pub fn covered(self, dura: Dura, bone: Arc<BoneVolume>) -> Self {
+        let (mut dura, mut wound) = (Membrane::of(dura, bone), self.wound);
+        dura.tell(&mut wound.dura);
+        Self { dura: Some(dura), wound, ..self }
+    }
+
+    /// How the wound bleeds, and how the dura lies.
+    pub fn wound(&self) -> &Wound {
+        &self.wound
     }
 
     /// Volume that was aspirated so far, mm³.

@@ -71,7 +71,7 @@ impl Program {
     pub fn tray(self) -> &'static [Tool] {
         match self {
             Self::Craniotomy => &TRAY[..BONE_TOOLS],
-            Self::Brain => &TRAY[BONE_TOOLS..],
+            Self::Brain => &TRAY[BONE_TOOLS..DURA_TOOL],
             Self::Integrated => &TRAY,
         }
     }
@@ -106,8 +106,10 @@ impl Phase {
 
 /// How many of the tray's tools cut bone; they come first.
 const BONE_TOOLS: usize = 4;
+/// The tool for the dura, which only a skull has.
+const DURA_TOOL: usize = 8;
 /// Every tool.
-const TRAY: [Tool; 8] = [
+const TRAY: [Tool; 9] = [
     Tool::burr(3.0),
     Tool::burr(2.0),
     Tool::perforator(),
@@ -116,6 +118,7 @@ const TRAY: [Tool; 8] = [
     Tool::spatula(),
     Tool::aspirator(),
     Tool::bipolar(),
+    Tool::scalpel(),
 ];
 
 /// Name of a tool in the tray: its kind and width.

@@ -101,8 +101,10 @@ mod tests {
         assert_eq!(ask(Buttons::take(ToolKind::Spatula), true, true), (Some(Change::Taken), 5));
         assert_eq!(ask(Buttons::take(ToolKind::Aspirator), true, true), (Some(Change::Taken), 6));
         ask(NONE, true, true);
-        assert_eq!(ask(Buttons::NEXT_TOOL, true, true), (Some(Change::Taken), 7), "the bipolar");
-        ask(NONE, true, true);
+        for tool in [7, 8] {
+            assert_eq!(ask(Buttons::NEXT_TOOL, true, true), (Some(Change::Taken), tool), "the bipolar, the scalpel");
+            ask(NONE, true, true);
+        }
         assert_eq!(ask(Buttons::NEXT_TOOL, true, false), (Some(Change::Taken), 0), "back to the bone");
     }
 

@@ -157,6 +157,8 @@ fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
         (None, true) => "Drilling (Space)",
         (Some(ToolKind::Bipolar), false) => "Hold to coagulate (Space)",
         (Some(ToolKind::Bipolar), true) => "Coagulating (Space)",
+        (Some(ToolKind::Scalpel), false) => "Hold to incise (Space)",
+        (Some(ToolKind::Scalpel), true) => "Incising (Space)",
         (Some(_), false) => "Hold to aspirate (Space)",
         (Some(_), true) => "Aspirating (Space)",
     };

@@ -43,6 +43,12 @@ fn silhouette(painter: &egui::Painter, area: egui::Rect, tool: &Tool, ink: Color
         }
         return;
     }
+    if tool.kind == ToolKind::Scalpel {
+        let blade = vec![tip, tip + egui::vec2(14.0, -4.0), tip + egui::vec2(14.0, 1.0)];
+        painter.add(egui::Shape::convex_polygon(blade, ink, Stroke::NONE));
+        painter.line_segment([tip + egui::vec2(14.0, -1.5), end], Stroke::new(4.0, ink));
+        return;
+    }
     painter.line_segment([tip, end], Stroke::new((2.0 * SCALE * tool.shaft_radius_mm).max(2.0), ink));
     painter.circle_filled(tip, (SCALE * tool.tip_radius_mm).max(2.5), ink);
     if tool.cutting_mm > 0.0 {
@@ -61,5 +67,6 @@ fn use_of(kind: ToolKind) -> &'static str {
         ToolKind::Spatula => "Retracts the brain",
         ToolKind::Aspirator => "Takes brain tissue away while its pedal is down",
         ToolKind::Bipolar => "Coagulates bleeding tissue while its pedal is down, and rinses",
+        ToolKind::Scalpel => "Incises the dura while its pedal is down",
     }
 }

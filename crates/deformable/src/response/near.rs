@@ -12,8 +12,8 @@
 //! Two bounds (plane distance, box) spare most exact distances: 2 ns each, against 15 ns; the
 //! closest triangle of the last point is tried first.
 
-use crate::{extent::Extent, surface::MovingSurface, triangle};
-use trepan_geometry::Vec3;
+use crate::{extent::Extent, surface::MovingSurface};
+use trepan_geometry::{Vec3, closest_weights};
 
 /// Triangles near a contact.
 pub(crate) struct Near {
@@ -83,7 +83,7 @@ impl Near {
             if triangle.at_least2(p) >= reach2 {
                 continue;
             }
-            let at = triangle::closest_weights(triangle.corners, p);
+            let at = closest_weights(triangle.corners, p);
             let distance = triangle.point(at).distance(p);
             self.close.push((distance, t as u32));
             if distance < nearest {

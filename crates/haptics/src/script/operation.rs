@@ -108,6 +108,8 @@ pub struct Plan {
     pub is_open: bool,
     /// Whether a flap's operation goes on to the brain.
     pub presses_after_flap: bool,
+    /// Lines along which the dura is incised before a resection, world mm; none where it is open.
+    pub incisions: Vec<Vec<Vec3>>,
     /// What is resected; `None` for a small ball of brain below the entry.
     pub target: Option<Target>,
 }
@@ -131,6 +133,7 @@ impl Default for Plan {
             foot_mm: 0.8,
             is_open: false,
             presses_after_flap: true,
+            incisions: Vec::new(),
             target: None,
         }
     }
@@ -180,7 +183,7 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
             let (start, moves) = opened(site, plan);
             let small = Target { centre: site.below(site.brain_mm + 1.5), radius_mm: 3.5, sinks_mm: 0.0 };
             let plan = &Plan { target: if name == "bleed" { Some(small) } else { plan.target }, ..plan.clone() };
-            let at_brain = resect(site, plan).into_iter().chain(coagulate(site, plan));
+            let at_brain = incise(site, plan).into_iter().chain(resect(site, plan)).chain(coagulate(site, plan));
             (start, upright, moves.into_iter().chain(at_brain.filter(|_| plan.presses_after_flap)).collect())
         }
         "craniotomy" => (start, upright, craniotomy(site, plan)),
@@ -195,7 +198,7 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
     let whole: f64 = moves.iter().map(|m| m.1).sum();
     let mut path = Path::from(start, rotation);
     for Move(label, share, tip, buttons) in moves {
-        if matches!(buttons.taken(), Some(ToolKind::Aspirator | ToolKind::Bipolar)) {
+        if matches!(buttons.taken(), Some(ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel)) {
             path.through(site.entry);
         }
         path.to(label, duration_ms * share / whole, tip, buttons);
@@ -283,6 +286,34 @@ fn opened(site: &Site, plan: &Plan) -> (Vec3, Vec<Move>) {
         (_, true) => (site.below(-plan.start_mm), craniotomy(site, plan)),
         _ => flap(site, &Plan { presses_after_flap: false, ..plan.clone() }),
     }
+}
+
+/// Share of the time for a millimetre of the scalpel's way, numerical: some 3 mm/s.
+const INCISING_SHARE: f64 = 0.65;
+/// Depth of the scalpel's middle below the dura, and above it between two incisions, mm, numerical.
+const INCISION_MM: [f32; 2] = [1.2, 5.0];
+
+/// Incises the dura along the planned lines with the scalpel; nothing without any.
+fn incise(site: &Site, plan: &Plan) -> Vec<Move> {
+    let away = site.below(-plan.away_mm);
+    let mut moves = Vec::new();
+    for line in &plan.incisions {
+        let [Some(first), Some(last)] = [line.first(), line.last()] else { continue };
+        let [over_first, over_last] = [first, last].map(|place| *place - INCISION_MM[1] * site.inward);
+        moves.push(Move("come to the dura", 5.0, over_first, HANDS_OFF));
+        let mut before = *first;
+        for place in line {
+            let share = INCISING_SHARE * f64::from(place.distance(before)).max(1.5);
+            moves.push(Move("incise the dura", share, *place + INCISION_MM[0] * site.inward, Buttons::PEDAL));
+            before = *place;
+        }
+        moves.push(Move("lift the scalpel", 1.5, over_last, HANDS_OFF));
+    }
+    if !moves.is_empty() {
+        moves.insert(0, Move("take the scalpel", 1.5, away, Buttons::take(ToolKind::Scalpel)));
+        moves.push(Move("leave", 4.0, away, HANDS_OFF));
+    }
+    moves
 }
 
 /// Share of the time for a millimetre of the aspirator's way, numerical; a flap takes 110.

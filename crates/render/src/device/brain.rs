@@ -4,9 +4,9 @@
 //! Only boundary nodes are uploaded, 32 bytes each per frame. Normals are the area-weighted mean
 //! over a node's triangles, computed on the processor.
 
-use crate::RenderError;
 use crate::border::Border;
 use crate::scene::Scene;
+use crate::{Leaves, RenderError};
 use glam::{Vec3, Vec4};
 use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 use trepan_mesh::TetMesh;
@@ -37,7 +37,8 @@ impl Device {
             rest: Buffer::zeroed(gpu, "brain at rest", nodes)?,
             corners: Buffer::zeroed(gpu, "brain corners", triangles)?,
         };
-        device.rest.write(gpu, 0, &wide(&border.places));
+        let rest: Vec<Vec3> = (0..border.places.len() as u32).map(|n| border.at_rest(n)).collect();
+        device.rest.write(gpu, 0, &wide(&rest));
         device.corners.write(gpu, 0, &border.triangles);
         Ok(device)
     }
@@ -63,16 +64,17 @@ impl Brain {
         Ok(Self { border, device, pipeline })
     }
 
-    /// Updates the boundary from the mesh's nodes, or resets it to rest. Returns whether other
-    /// tetrahedra are gone than before: then the pass is to be bound again.
+    /// Updates the boundary from the mesh's nodes, or resets it to rest, and the dura over it.
+    /// Returns whether other triangles are there than before: then the pass is to be bound again.
     pub fn follow(
         &mut self,
         gpu: &Gpu,
         positions: Option<&[Vec3]>,
         gone: Option<&[bool]>,
         stains: Option<&[u8]>,
+        dura: Option<&Leaves>,
     ) -> Result<bool, RenderError> {
-        let is_other = self.border.leave_out(gone);
+        let is_other = self.border.leave_out(gone) | self.border.cover(dura)?;
         if is_other {
             self.device = Device::of(gpu, &self.border)?;
         }

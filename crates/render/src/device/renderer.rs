@@ -113,7 +113,13 @@ impl Renderer {
     /// Updates the brain and its cut; returns the number of triangles over the limit.
     fn follow_brain(&mut self, frame: &Frame) -> Result<u32, RenderError> {
         let Some((brain, face)) = &mut self.passes.brain else { return Ok(0) };
-        let is_other = brain.follow(&self.gpu, frame.brain_positions, frame.brain_gone, frame.brain_stains)?;
+        let is_other = brain.follow(
+            &self.gpu,
+            frame.brain_positions,
+            frame.brain_gone,
+            frame.brain_stains,
+            frame.dura.as_ref(),
+        )?;
         let left = face.follow(&self.gpu, Cut::plane(frame.cut.as_ref()), &brain.border);
         if is_other {
             self.canvas.rebind(&self.gpu, &self.passes)?;

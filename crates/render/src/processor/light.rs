@@ -5,6 +5,7 @@ use super::brain::Fragment;
 use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
 use super::tool::{ToolHit, lit};
+use crate::border::DURA;
 use crate::bricks::NOTHING;
 use crate::mix::trilinear;
 use crate::mri::Signals;
@@ -95,9 +96,20 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
             key *= 0.25;
         }
     }
+    if brain.stain < 0.75 * DURA {
+        let normal = if brain.normal.dot(along) > 0.0 { -brain.normal } else { brain.normal };
+        return lit(scene, dura_colour(brain.rest), normal, along, open, key, 0.25);
+    }
     let colour = painted(brain_colour(inputs.mri, brain.rest - 3.5 * brain.normal));
     let (colour, film) = stained(colour, brain.stain);
     lit(scene, colour, brain.normal, along, open, key, 0.20 + 0.3 * film)
+}
+
+/// Colour of the dura: pale, with vessels that branch; by the place at rest, mm.
+fn dura_colour(rest: Vec3) -> Vec3 {
+    let wave = |p: Vec3| (p.x + 1.7 * p.y.sin() + 0.8 * (1.7 * p.z).sin()).sin().abs();
+    let vessel = 1.0 - smoothstep(0.02, 0.10, wave(0.16 * rest).min(wave(0.29 * Vec3::new(rest.y, rest.z, rest.x))));
+    Vec3::new(0.80, 0.68, 0.62).lerp(Vec3::new(0.55, 0.22, 0.22), 0.7 * vessel)
 }
 
 /// Colour of tissue under blood or burnt, and how much of it the blood covers.

@@ -165,6 +165,7 @@ impl ProcessorRenderer {
         let followed = self.bricks.follow(self.bricks_per_frame);
         if let Some(brain) = &mut self.brain {
             brain.leave_out(frame.brain_gone);
+            brain.cover(frame.dura.as_ref())?;
             brain.follow(frame.brain_positions)?;
             brain.stain(frame.brain_stains);
         }

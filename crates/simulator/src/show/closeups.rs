@@ -7,7 +7,7 @@
 
 use crate::error::SessionError;
 use crate::session_setup::SessionSetup;
-use crate::show::picture::{microscope, snap};
+use crate::show::picture::{leaves, microscope, snap};
 use std::path::Path;
 use trepan_geometry::Vec3;
 use trepan_link::Recording;
@@ -25,7 +25,7 @@ const GRAVE: [&str; 4] = ["brain-touched", "brain-pressed", "forbidden-near", "b
 
 impl SessionSetup {
     /// Draws the opening, and the tool at the first warning of each kind, the gravest kinds. The
-    /// wound is that of the end: its blood, and no tetrahedra of which nothing is left.
+    /// wound is that of the end: its blood, its dura, and no tetrahedra of which nothing is left.
     pub fn close_pictures(
         &self,
         painter: &mut Painter,
@@ -35,11 +35,11 @@ impl SessionSetup {
     ) -> Vec<Result<Shot, SessionError>> {
         let shown = self.program.has_bone();
         let gone: Vec<bool> = end.fills.iter().map(|fill| *fill == 0).collect();
-        let stains = end.bleeding.as_ref().map(|bleeding| &bleeding.stains[..]);
         let plain = |camera: Camera| Frame {
             show_bone: shown,
             brain_gone: Some(&gone[..]).filter(|gone| !gone.is_empty()),
-            brain_stains: stains,
+            brain_stains: Some(&end.wound.bleeding.stains[..]).filter(|stains| !stains.is_empty()),
+            dura: leaves(&end.wound.dura),
             slices: SliceLook { shown: false, ..SliceLook::default() },
             ..Frame::of(camera)
         };

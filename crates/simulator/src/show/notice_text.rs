@@ -29,7 +29,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
-    let on_tissue = Some(sample.tool.kind).filter(|kind| matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar));
+    let on_tissue = Some(sample.tool.kind)
+        .filter(|kind| matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel));
     let brain_mm = match view.brain_distance_mm {
         mm if mm.is_finite() => format!("{mm:.1} mm"),
         _ => "no brain here".into(),
@@ -126,6 +127,9 @@ pub(crate) fn hint(tool: &Tool, by_hand: bool) -> &'static str {
         }
         (Phase::Brain, true) if tool.kind == ToolKind::Bipolar => {
             "point at tissue that bleeds and hold the left button to coagulate it; let go to draw back"
+        }
+        (Phase::Brain, true) if tool.kind == ToolKind::Scalpel => {
+            "hold the left button and draw the scalpel over the dura; another tool holds the leaves back"
         }
         (Phase::Brain, true) => "point at the brain and hold the left button to press it; let go to draw back",
     }

@@ -9,14 +9,15 @@ use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_patient::opening::eye;
-use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
+use trepan_render::{Camera, Frame, Image, Leaves, Overlay, Painter, SliceLook};
 use trepan_report::page::Shot;
 use trepan_report::summary::MovingSummary;
 use trepan_runtime::clock::Clock;
 use trepan_runtime::stop::Stop;
 use trepan_runtime::{RenderInputs, Times, View};
-use trepan_stages::Bleeding;
+use trepan_stages::DuraState;
 use trepan_stages::collision_step::SoftFrame;
+use trepan_stages::collision_step::Wound;
 use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;
 
@@ -91,15 +92,15 @@ pub(crate) struct Shape {
     /// What is left of its tetrahedra, of 65535, and which are gone; empty where none can go.
     pub fills: Vec<u16>,
     pub gone: Vec<bool>,
-    /// How its wound bleeds.
-    pub bleeding: Bleeding,
+    /// Its wound.
+    pub wound: Wound,
 }
 
 impl Shape {
     /// Takes what solver and collision published.
     pub fn follow(&mut self, inputs: &mut RenderInputs) {
         inputs.soft.iter_mut().for_each(|soft| self.take(soft.latest().0));
-        inputs.bleeding.iter_mut().for_each(|bleeding| self.bleeding.copy_from(bleeding.latest().0));
+        inputs.wound.iter_mut().for_each(|wound| self.wound.copy_from(wound.latest().0));
     }
 
     /// Takes what the solver published.
@@ -155,11 +156,18 @@ pub(crate) fn frame<'a>(
         overlay: Overlay { force: arrow(view), ..Overlay::default() },
         brain_positions: Some(&brain.positions[..]).filter(|positions| !positions.is_empty()),
         brain_gone: Some(&brain.gone[..]).filter(|gone| !gone.is_empty()),
-        brain_stains: Some(&brain.bleeding.stains[..]).filter(|stains| !stains.is_empty()),
+        brain_stains: Some(&brain.wound.bleeding.stains[..]).filter(|stains| !stains.is_empty()),
+        dura: leaves(&brain.wound.dura),
         show_bone: bone_shown,
         slices: SliceLook { half_height_mm: Some(SLICE_MM), ..SliceLook::default() },
         ..Frame::of(camera)
     }
+}
+
+/// The dura as it lies; `None` without one.
+pub(super) fn leaves(dura: &DuraState) -> Option<Leaves<'_>> {
+    let DuraState { rest, places, triangles, .. } = dura;
+    (!triangles.is_empty()).then_some(Leaves { rest, places, triangles })
 }
 
 /// Returns the arrow of the force on the hand at the tool's tip; `None` for a weak force.

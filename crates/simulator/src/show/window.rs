@@ -108,9 +108,14 @@ impl ViewState {
         if taken_ml > 0.0 || view.sample.tool.kind == ToolKind::Aspirator {
             panel.task.push(("tissue taken".into(), format!("{taken_ml:.2} ml")));
         }
-        let Bleeding { bled_ml, rate_ml_per_min, .. } = brain.bleeding;
+        let Bleeding { bled_ml, rate_ml_per_min, .. } = brain.wound.bleeding;
         if bled_ml > 0.0 {
             panel.task.push(("blood lost".into(), format!("{bled_ml:.1} ml, {rate_ml_per_min:.1} ml/min")));
+        }
+        let dura = &brain.wound.dura;
+        if !dura.triangles.is_empty() {
+            let incised = if dura.opened_s.is_some() { "open" } else { "closed: incise it with the scalpel" };
+            panel.task.push(("dura".into(), incised.into()));
         }
         if !by_hand {
             let options = panel.choices.iter_mut().flat_map(|choice| &mut choice.options);
@@ -314,7 +319,7 @@ impl window::Session for Show {
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let step = self.guide.as_mut().map(|guide| {
-            guide.follow(view, [self.shown.taken_ml(&self.brain), self.brain.bleeding.rate_ml_per_min.into()])
+            guide.follow(view, [self.shown.taken_ml(&self.brain), self.brain.wound.bleeding.rate_ml_per_min.into()])
         });
         let usual = || if teaches { TEACH } else { notice_text::hint(&view.sample.tool, by_hand) }.into();
         let hint = step.unwrap_or_else(usual);
@@ -500,7 +505,7 @@ mod tests {
         let (mut writer, view) = cell(View::at(sample, 1.0));
         let mut show = Show {
             view: View::at(sample, 1.0),
-            inputs: RenderInputs { view, soft: None, bleeding: None, film: None },
+            inputs: RenderInputs { view, soft: None, wound: None, film: None },
             brain: Shape::default(),
             shown: ViewState {
                 case: "case".into(),

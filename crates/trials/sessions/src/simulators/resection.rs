@@ -36,7 +36,12 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
     let words = "integrated --headless --frames-per-second 0 --device script:resect --quality";
     let options = Options::try_parse_from(words.split(' ').chain([quality, "--set", INGREDIENTS]))?;
     let session = Session::open(Program::Integrated, options, case::inputs())?;
-    let how = Plan { outline: session.plan().outline.clone(), target: session.plan().target, ..Plan::default() };
+    let how = Plan {
+        outline: session.plan().outline.clone(),
+        target: session.plan().target,
+        incisions: session.plan().incisions.clone(),
+        ..Plan::default()
+    };
     let mut script = Script::planned("resect", &session.plan().site, END_MS as f64, &how)?;
     let mut stages = session.stages(script.at(0.0))?;
     let mut tissue = stages.tissue.take().context("the program has tissue")?;
@@ -77,7 +82,7 @@ fn judge(
     let fills = solver.fills();
     let (whole, left) = (brain.left_mm3(&vec![u16::MAX; fills.len()]), brain.left_mm3(fills));
     let taken = |at: usize| whole[at] - left[at];
-    let bleeding = collision.bleeds().context("the wound bleeds")?;
+    let bleeding = &collision.wound().bleeding;
     let unaccounted = (bleeding.bled_ml - bleeding.sucked_ml - bleeding.lies_ml).abs() / bleeding.bled_ml;
     let (all_mm3, tumour) = (whole.iter().sum::<f64>(), TissueClass::Tumour as usize);
     let gone_mm3 = (0..whole.len()).map(taken).sum::<f64>();

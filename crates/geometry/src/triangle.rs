@@ -5,11 +5,13 @@
 //! first corner (Ericson 2005, Real-Time Collision Detection, 5.1.5). A flat triangle ends in one
 //! of its edges or corners.
 
-use trepan_geometry::Vec3;
+use crate::Vec3;
 
-/// Weights of the closest point on the corners; they sum to 1 and are never negative.
+/// Weights on the corners of the point of a triangle that is closest to `p`.
+///
+/// Their sum is 1, none is negative.
 #[inline]
-pub(crate) fn closest_weights([a, b, c]: [Vec3; 3], p: Vec3) -> [f32; 3] {
+pub fn closest_weights([a, b, c]: [Vec3; 3], p: Vec3) -> [f32; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {
