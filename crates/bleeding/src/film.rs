@@ -181,6 +181,34 @@ impl Film {
         });
     }
 
+    /// Appends what lies where, and the account.
+    pub(crate) fn save(&self, to: &mut Vec<u64>) {
+        to.push(self.wet.len() as u64);
+        for &face in &self.wet {
+            let [blood, saline] = self.volumes[face as usize];
+            to.extend([face.into(), blood, saline]);
+        }
+        to.extend(self.account.came);
+        to.extend(self.account.sucked);
+    }
+
+    /// Takes that over on a dry border, to the picolitre; `None` if it does not fit or balance.
+    pub(crate) fn restore(&mut self, words: &mut impl Iterator<Item = u64>) -> Option<()> {
+        for _ in 0..words.next()? {
+            let face = words.next().filter(|face| *face < self.volumes.len() as u64)? as u32;
+            let pl = [words.next()?, words.next()?];
+            let is_new = !std::mem::replace(&mut self.is_wet[face as usize], true);
+            self.volumes[face as usize] = pl;
+            self.wet.push((is_new && pl.iter().all(|pl| *pl <= MOST_PL)).then_some(face)?);
+        }
+        self.account.came = [words.next()?, words.next()?];
+        self.account.sucked = [words.next()?, words.next()?];
+        let lies = self.lies_pl();
+        (0..2)
+            .all(|fluid| lies[fluid].checked_add(self.account.sucked[fluid]) == Some(self.account.came[fluid]))
+            .then_some(())
+    }
+
     /// Thickness of the blood on a face, mm.
     pub fn blood_mm(&self, border: &Border, positions: &[Vec3], face: u32) -> f32 {
         Place::of(border, positions, Vec3::Z, face).film_mm([self.volumes[face as usize][0], 0])
