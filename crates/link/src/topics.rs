@@ -6,16 +6,16 @@
 //! waits: a slow, stopped or dead subscriber loses old messages without affecting others.
 //!
 //! ```text
-//!   simulator ──"header", "tick", "event"──> watcher
-//!             <──"teacher"──────────────────
+//!   simulator ──"header", "tick", "event", "state"──> watcher
+//!             <──"teacher"───────────────────────────
 //! ```
 //!
 //! # Practice
 //! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`], a header 64
-//! KiB; publishing one costs a few µs. Publish from the recorder's thread, not from a haptic tick.
-//! [`Subscriber::newest`] has no age: a dead publisher looks like a silent one, so compare the
-//! sequence numbers with the clock. Leftovers of a killed process are removed when the next one
-//! joins. Signal handlers are not changed.
+//! KiB, a state 32 MiB; publishing one costs a few µs, a state some ms. Publish from the recorder's
+//! thread, not from a haptic tick. [`Subscriber::newest`] has no age: a dead publisher looks like a
+//! silent one, so compare the sequence numbers with the clock. Leftovers of a killed process are
+//! removed when the next one joins. Signal handlers are not changed.
 //!
 //! # Sources
 //! <https://iceoryx.io>.
@@ -25,11 +25,13 @@
 //! use iceoryx2's tunnel.
 
 use crate::protobuf::{decode, encode};
-use crate::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TeacherRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, StateRecord, TeacherRecord, TickRecord};
 use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::port::subscriber::Subscriber as SubscriberPort;
 use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level};
+use iceoryx2::prelude::{
+    AllocationStrategy, LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level,
+};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::marker::PhantomData;
 use std::time::SystemTime;
@@ -38,6 +40,8 @@ use std::time::SystemTime;
 pub const MAX_MESSAGE_BYTES: usize = 4096;
 /// Longest header, bytes: a drawn flap has hundreds of points.
 const MAX_HEADER_BYTES: usize = 65536;
+/// Longest state, bytes: four million changed places of a skull.
+const MAX_STATE_BYTES: usize = 32 << 20;
 /// Most simulators and watchers that share a topic.
 const MAX_MEMBERS: usize = 16;
 
@@ -77,6 +81,7 @@ topics!(
     EventRecord = "event", MAX_MESSAGE_BYTES, 256;
     TeacherRecord = "teacher", MAX_MESSAGE_BYTES, 256;
     SessionHeader = "header", MAX_HEADER_BYTES, 1;
+    StateRecord = "state", MAX_STATE_BYTES, 1;
 );
 
 /// A topic could not be used.
@@ -148,7 +153,10 @@ impl Session {
 
     /// Creates a publisher of `T`.
     pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, TopicError> {
-        let port = self.topic::<T>()?.publisher_builder().initial_max_slice_len(T::MAX_BYTES).create();
+        let topic = self.topic::<T>()?;
+        let port = topic.publisher_builder().initial_max_slice_len(T::MAX_BYTES.min(MAX_HEADER_BYTES));
+        // Only a state grows: no longer message of another topic is sent.
+        let port = port.allocation_strategy(AllocationStrategy::PowerOfTwo).create();
         let port = port.map_err(|error| failed("publish", &self.name, &error))?;
         Ok(Publisher { port, bytes: Vec::with_capacity(512), session: self.name.clone(), record: PhantomData })
     }

@@ -207,6 +207,28 @@ impl TeacherRecord {
     pub const BLEEDING: u32 = 1 << 4;
 }
 
+/// State of a shared session at a tick, for who joins late.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StateRecord {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Session time, ms.
+    pub time_ms: f64,
+    /// The state, in words that only the session's stages know.
+    pub words: Vec<u64>,
+    /// Checksum of the words.
+    pub checksum: u32,
+}
+
+impl StateRecord {
+    /// Checksum of words, as a whole record has it.
+    pub fn sum(words: &[u64]) -> u32 {
+        let mut sum = crc32fast::Hasher::new();
+        words.iter().for_each(|word| sum.update(&word.to_le_bytes()));
+        sum.finalize()
+    }
+}
+
 /// Description of a session: enough to repeat it, without a patient's name, number, date or folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]

@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_link::topics::{MAX_MESSAGE_BYTES, Session, TopicError};
-use trepan_link::wire::{EventRecord, SessionHeader, TeacherRecord, TickRecord};
+use trepan_link::wire::{EventRecord, SessionHeader, StateRecord, TeacherRecord, TickRecord};
 
 const ROLE: &str = "TREPAN_TEST_ROLE";
 
@@ -176,4 +176,21 @@ fn who_joins_late_gets_the_header_as_it_was_written() {
         late.newest().unwrap()
     });
     assert_eq!(received, header);
+}
+
+#[test]
+fn who_joins_late_gets_the_newest_state_whole_at_any_size() {
+    let session = Session::join(&session_name("state")).unwrap();
+    let mut publisher = session.publisher::<StateRecord>().unwrap();
+    for size in [0, 400_000, 3_000_000, 7] {
+        let words: Vec<u64> = (0..size).map(|n: u64| n.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
+        let state = StateRecord { tick: 7, time_ms: 0.5, checksum: StateRecord::sum(&words), words };
+        publisher.send(&state).unwrap();
+        let mut late = session.subscriber::<StateRecord>().unwrap();
+        publisher.greet().unwrap();
+        let received = late.newest().unwrap().unwrap();
+        assert!(received == state && received.checksum == StateRecord::sum(&received.words), "{size} words");
+    }
+    let long = StateRecord { words: vec![0; 5_000_000], ..StateRecord::default() };
+    assert!(matches!(publisher.send(&long), Err(TopicError::TooLong { .. })));
 }

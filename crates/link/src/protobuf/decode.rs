@@ -1,4 +1,5 @@
-//! Decodes a record from arbitrary bytes, without panics and without allocation except for strings.
+//! Decodes a record from arbitrary bytes, without panics and without allocation except for strings
+//! and words.
 
 use super::{Fields, Nested, Value, Visit, wire_type};
 
@@ -88,6 +89,10 @@ fn read(raw: Raw<'_>, field: Value<'_>) -> Option<()> {
         (Raw::Fixed32(bits), Value::Float(field)) => *field = f32::from_bits(bits),
         (Raw::Fixed64(bits), Value::Double(field)) => *field = f64::from_bits(bits),
         (Raw::Bytes(bytes), Value::String(field)) => str::from_utf8(bytes).ok()?.clone_into(field),
+        (Raw::Bytes(bytes), Value::Words(field)) => {
+            let (words, []) = bytes.as_chunks() else { return None };
+            *field = words.iter().map(|word| u64::from_le_bytes(*word)).collect();
+        }
         (Raw::Bytes(bytes), Value::Message(_, fields)) => read_message(bytes, fields)?,
         _ => return None,
     }

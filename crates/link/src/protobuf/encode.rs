@@ -27,6 +27,10 @@ impl Visit for Vec<u8> {
                 put_varint(self, value.len() as u64);
                 self.extend_from_slice(value.as_bytes());
             }
+            Value::Words(value) => {
+                put_varint(self, 8 * value.len() as u64);
+                value.iter().for_each(|word| self.extend_from_slice(&word.to_le_bytes()));
+            }
             Value::Message(_, fields) => {
                 let length_at = self.len();
                 self.push(0);
@@ -45,7 +49,7 @@ impl Value<'_> {
             Self::Uint32(_) | Self::Uint64(_) => wire_type::VARINT,
             Self::Float(_) => wire_type::FIXED32,
             Self::Double(_) => wire_type::FIXED64,
-            Self::String(_) | Self::Message(..) => wire_type::BYTES,
+            Self::String(_) | Self::Words(_) | Self::Message(..) => wire_type::BYTES,
         }
     }
 }

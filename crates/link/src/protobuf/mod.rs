@@ -42,6 +42,7 @@ pub enum Value<'a> {
     Float(&'a mut f32),
     Double(&'a mut f64),
     String(&'a mut String),
+    Words(&'a mut Vec<u64>),
     Message(&'static str, Nested<'a>),
 }
 
@@ -67,7 +68,9 @@ pub(crate) mod wire_type {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};
+    use crate::wire::{
+        CollisionRecord, EventRecord, SecondRecord, SolverRecord, StateRecord, TeacherRecord, TickRecord,
+    };
     use proptest::prelude::*;
 
     /// Encoded bytes before and after a round trip, with fields of every bit pattern from `seed`,
@@ -104,6 +107,7 @@ mod tests {
                 Value::Float(value) => *value = f32::from_bits(self.next() as u32),
                 Value::Double(value) => *value = f64::from_bits(self.next()),
                 Value::String(value) => *value = format!("é{:x}", self.next()),
+                Value::Words(value) => *value = (0..self.next() % 9).map(|_| self.next()).collect(),
                 Value::Message(_, fields) => fields(self),
             }
         }
@@ -114,7 +118,7 @@ mod tests {
         fn every_bit_survives(seed: u64) {
             for (first, second) in [round_trip::<TickRecord>(seed), round_trip::<CollisionRecord>(seed),
                                     round_trip::<SolverRecord>(seed), round_trip::<EventRecord>(seed), round_trip::<TeacherRecord>(seed),
-                                    round_trip::<SecondRecord>(seed)] {
+                                    round_trip::<SecondRecord>(seed), round_trip::<StateRecord>(seed)] {
                 prop_assert!(!first.is_empty());
                 prop_assert_eq!(first, second);
             }
@@ -124,6 +128,7 @@ mod tests {
         fn any_bytes_decode_or_fail_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
             let _ = decode::<TickRecord>(&bytes);
             let _ = decode::<EventRecord>(&bytes);
+            let _ = decode::<StateRecord>(&bytes);
         }
     }
 

@@ -1,7 +1,9 @@
 //! The numbered fields of each record. A number is never reused for another field.
 
 use super::{Field, Fields, Value, Visit};
-use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TeacherRecord, TickRecord};
+use crate::wire::{
+    CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, StateRecord, TeacherRecord, TickRecord,
+};
 use trepan_geometry::{Pose, Quat, Twist, Vec3, Wrench};
 
 /// Lists messages: the type, its name in files, the number and name of each field.
@@ -30,6 +32,7 @@ messages! {
     SolverRecord = "Solver" { 1 step, 2 contact_seq, 3 time_ms, 4 max_displacement_mm, 5 inverted, 6 compute_us, 7 cheaper }
     EventRecord = "Event" { 1 tick, 2 time_ms, 3 kind, 4 text }
     TeacherRecord = "Teacher" { 1 seq, 2 ghost, 3 marker, 4 flags }
+    StateRecord = "State" { 1 tick, 2 time_ms, 3 words, 4 checksum }
     Vec3 = "Vector" { 1 x, 2 y, 3 z }
     Quat = "Quaternion" { 1 x, 2 y, 3 z, 4 w }
     Pose = "Pose" { 1 translation, 2 rotation }
@@ -62,7 +65,7 @@ macro_rules! scalars {
     )*};
 }
 
-scalars!(u32 = Uint32, u64 = Uint64, f32 = Float, f64 = Double, String = String);
+scalars!(u32 = Uint32, u64 = Uint64, f32 = Float, f64 = Double, String = String, Vec<u64> = Words);
 
 impl Field for u8 {
     fn visit_as(&mut self, number: u32, name: &'static str, visit: &mut dyn Visit) {

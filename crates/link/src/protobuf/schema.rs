@@ -63,6 +63,7 @@ impl Visit for Describer {
             Value::Float(_) => (Type::Float, None),
             Value::Double(_) => (Type::Double, None),
             Value::String(_) => (Type::String, None),
+            Value::Words(_) => (Type::Bytes, None),
             Value::Message(name, _) => (Type::Message, Some(format!(".{name}"))),
         };
         self.open.field.push(FieldDescriptorProto {
