@@ -285,6 +285,35 @@ impl Dura {
         }
     }
 
+    /// Words that [`save`](Self::save) appends at most.
+    pub fn most_words(&self) -> usize {
+        8 + self.sheet.most_words()
+    }
+
+    /// Appends the sheet's state for [`restore`](Self::restore).
+    pub fn save(&self, to: &mut Vec<u64>) {
+        let Account { incised_mm, cut_out_mm2, torn, opened_ms } = self.account;
+        to.extend([incised_mm, cut_out_mm2].map(|of| u64::from(of.to_bits())));
+        to.push(torn.into());
+        to.extend([opened_ms, self.held_ms].map(|ms| ms.unwrap_or(f64::NAN).to_bits()));
+        self.sheet.save(to);
+    }
+
+    /// Takes over what a sheet over the same place saved; times are `later_ms` later here. `None`,
+    /// and no change, if it does not fit.
+    pub fn restore(&mut self, words: &mut impl Iterator<Item = u64>, later_ms: f64) -> Option<()> {
+        let [incised_mm, cut_out_mm2] = [f32::from_bits(words.next()? as u32), f32::from_bits(words.next()? as u32)];
+        let torn = words.next()? as u32;
+        let mut ms = || words.next().map(|bits| Some(f64::from_bits(bits) + later_ms).filter(|ms| ms.is_finite()));
+        let [opened_ms, held_ms] = [ms()?, ms()?];
+        self.sheet.restore(words)?;
+        self.account = Account { incised_mm, cut_out_mm2, torn, opened_ms };
+        (self.held_ms, self.blade) = (held_ms, Blade::default());
+        self.changed();
+        self.turn_normals();
+        Some(())
+    }
+
     /// Goes on to a time, ms; returns the force on the tool, N. Costs 25 ns for each free triangle
     /// and 0.1 ms while anything moves.
     pub fn step(&mut self, now_ms: f64, tip: Option<Tip>) -> Vec3 {
@@ -520,7 +549,8 @@ mod tests {
 
     /// Central load on a clamped sheet without tension.
     ///
-    /// `F = E h q³ w³ / a²` with `q = 1 / (1.05 - 0.15 ν - 0.16 ν²)` (Komaragiri, Begley and Simmonds 2005).
+    /// `F = E h q³ w³ / a²` with `q = 1 / (1.05 - 0.15 ν - 0.16 ν²)` (Komaragiri, Begley and
+    /// Simmonds 2005).
     #[test]
     fn a_tip_that_presses_the_middle_feels_what_theory_says() {
         let q = 1.0 / (1.05 - 0.15 * 0.3 - 0.16 * 0.09f32);
@@ -587,6 +617,15 @@ mod tests {
         // The middle is four leaves.
         let middle = dura.sheet.nodes.iter().filter(|node| node.rest.distance(Vec3::new(0.2, 0.3, 0.0)) < 0.8).count();
         assert!(middle >= 4, "{middle} corners in the middle");
+        let mut words = Vec::with_capacity(dura.most_words());
+        dura.save(&mut words);
+        assert!(words.len() <= dura.most_words());
+        let mut taken = disc(Law { strain: 1e-3, below: BELOW, ..LAW }, 8);
+        assert!(taken.restore(&mut words[..words.len() - 1].iter().copied(), 0.0).is_none() && !taken.is_open());
+        taken.restore(&mut words.into_iter(), 5.0).unwrap();
+        assert!(taken.places().eq(dura.places()) && taken.triangles().eq(dura.triangles()));
+        assert_eq!(taken.account().opened_ms, account.opened_ms.map(|ms| ms + 5.0));
+        assert!(disc(LAW, 7).restore(&mut [0; 4].into_iter(), 0.0).is_none());
         dura.hold_back();
         let (from_ms, again) = (dura.now_ms, run());
         assert!(dura.places().eq(again.places()), "the same bits again");

@@ -280,6 +280,63 @@ impl Sheet {
         true
     }
 
+    /// Words that [`save`](Self::save) appends at most.
+    pub fn most_words(&self) -> usize {
+        1 + 6 * self.room + 4 * self.triangles.len()
+    }
+
+    /// Appends nodes and triangles.
+    pub fn save(&self, to: &mut Vec<u64>) {
+        let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
+        let floats = |a: f32, b: f32| pair(a.to_bits(), b.to_bits());
+        to.push(self.nodes.len() as u64);
+        for Node { rest, place, pinned, rim, triangle, suture, .. } in &self.nodes {
+            to.extend([floats(rest.x, rest.y), floats(rest.z, place.x), floats(place.y, place.z)]);
+            let flags = [*pinned, *rim, suture.is_some()].iter().fold(0, |flags, flag| 2 * flags + u32::from(*flag));
+            to.push(pair(flags, *triangle));
+            let suture = suture.unwrap_or(Vec3::ZERO);
+            to.extend([floats(suture.x, suture.y), floats(suture.z, 0.0)]);
+        }
+        for Triangle { corners: [a, b, c], beyond: [d, e, f], live, .. } in &self.triangles {
+            to.extend([pair(*a, *b), pair(*c, *d), pair(*e, *f), u64::from(*live)]);
+        }
+    }
+
+    /// Takes over what a sheet over the same place saved; `None`, and no change, if it does not fit.
+    pub fn restore(&mut self, words: &mut impl Iterator<Item = u64>) -> Option<()> {
+        let mut pair = || words.next().map(|word| [(word >> 32) as u32, word as u32]);
+        let count = pair()?[1];
+        let first = *self.nodes.first()?;
+        let mut nodes = Vec::with_capacity(2 * self.room);
+        for _ in 0..count.min(self.room as u32) {
+            let all = [pair()?, pair()?, pair()?];
+            let [rx, ry, rz, px, py, pz] = all.as_flattened() else { return None };
+            let [rest, place] = [[rx, ry, rz], [px, py, pz]].map(|at| Vec3::from(at.map(|bits| f32::from_bits(*bits))));
+            let [flags, triangle] = pair()?;
+            let [[sx, sy], [sz, _]] = [pair()?, pair()?];
+            let suture = (flags & 1 == 1).then(|| Vec3::from([sx, sy, sz].map(f32::from_bits)));
+            let (pinned, rim) = (flags >> 2 & 1 == 1, flags >> 1 & 1 == 1);
+            let foot = self.nodes.get(nodes.len()).and_then(|node| node.foot);
+            nodes.push(Node { rest, place, pinned, rim, triangle, suture, foot, support: Vec3::ZERO, ..first });
+        }
+        let mut triangles = Vec::with_capacity(self.triangles.len());
+        for _ in 0..self.triangles.len() {
+            let [[a, b], [c, d], [e, f], [_, live]] = [pair()?, pair()?, pair()?, pair()?];
+            let (corners, beyond) = ([a, b, c], [d, e, f]);
+            if corners.iter().any(|&n| n >= count) {
+                return None;
+            }
+            let shape = Shape::of(corners.map(|n| nodes[n as usize].rest));
+            triangles.push(Triangle { corners, beyond, shape, live: live == 1 });
+        }
+        let known = |t: u32| t == NONE || (t as usize) < triangles.len();
+        let is_sound =
+            nodes.iter().all(|node: &Node| known(node.triangle) && node.rest.is_finite() && node.place.is_finite())
+                && nodes.len() == count as usize
+                && triangles.iter().all(|t| t.beyond.into_iter().all(known));
+        is_sound.then(|| (self.nodes, self.triangles) = (nodes, triangles))
+    }
+
     /// Takes away what no pinned node holds any more; returns its area, mm².
     pub fn remove_loose(&mut self) -> f32 {
         self.reached.fill(false);

@@ -136,6 +136,25 @@ impl Aspirator {
             self.take(tet, self.volumes_mm3[tet as usize] * dt_ms / LEAVES_MS, fills);
         }
         self.leaving.retain(|tet| fills[*tet as usize] > 0);
+        self.loosen(fills);
+    }
+
+    /// Takes over what another aspirator left, and all that it took; `thinned` names all of it.
+    pub fn restore(&mut self, fills: &[u16], taken_mm3: f64) {
+        self.taken_mm3 = taken_mm3;
+        self.thinned.clear();
+        for (tet, &fill) in fills.iter().enumerate().filter(|(_, fill)| **fill < u16::MAX) {
+            self.left_mm3[tet] = self.volumes_mm3[tet] * f32::from(fill) / FILLS[0];
+            self.thinned.push(tet as u32);
+            if f32::from(fill) < FILLS[1] && !std::mem::replace(&mut self.leaves[tet], true) && fill > 0 {
+                self.leaving.push(tet as u32);
+            }
+        }
+        self.loosen(fills);
+    }
+
+    /// Finds the pieces that hang loose since the thinned tetrahedra went.
+    fn loosen(&mut self, fills: &[u16]) {
         for at in 0..self.thinned.len() {
             let tet = self.thinned[at] as usize;
             for from in self.pieces.neighbours[tet].into_iter().filter(|_| fills[tet] == 0) {

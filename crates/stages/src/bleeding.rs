@@ -49,7 +49,7 @@ impl Bleeding {
 
 /// The wound and its account.
 pub(crate) struct Bleeder {
-    wound: Wound,
+    pub wound: Wound,
     /// Against gravity, a unit vector.
     up: Vec3,
 }
@@ -80,9 +80,13 @@ impl Bleeder {
             Some((state.tip(), tool.tip_radius_mm, act))
         });
         self.wound.step(now_ms, positions, self.up, acts);
+        self.tell(self.wound.rate_ml_per_min(now_ms), now);
+    }
+
+    /// Tells how the wound is, with its rate, ml/min.
+    pub fn tell(&self, rate: f32, now: &mut Bleeding) {
         let (account, lies) = (self.wound.account(), self.wound.lies_pl());
         let ml = |pl: u64| pl as f64 / PL_PER_ML;
-        let rate = self.wound.rate_ml_per_min(now_ms);
         (now.bled_ml, now.rinsed_ml) = (ml(account.came[0]), ml(account.came[1]));
         (now.sucked_ml, now.lies_ml) = (ml(account.sucked[0]), ml(lies[0]));
         (now.rate_ml_per_min, now.worst_ml_per_min) = (rate, now.worst_ml_per_min.max(rate));

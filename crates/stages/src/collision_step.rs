@@ -264,6 +264,61 @@ impl CollisionStage {
         self.aspirator.as_ref().map_or(0.0, |aspirator| aspirator.taken_mm3)
     }
 
+    /// Appends the wound's state for [`restore`](Self::restore); false, and nothing, while blood
+    /// flows, up to ten steps. Does not allocate with [`room_to_save`](Self::room_to_save).
+    pub fn save(&self, to: &mut Vec<u64>) -> bool {
+        if self.bleeder.as_ref().is_some_and(|bleeder| !bleeder.wound.rests()) {
+            return false;
+        }
+        to.push(self.settling.opened_ms.unwrap_or(f64::NAN).to_bits());
+        to.extend([self.aspirated_mm3().to_bits(), self.loads.fills.len() as u64]);
+        to.extend(self.loads.fills.iter().map(|fill| u64::from(*fill)));
+        self.dura.iter().for_each(|membrane| membrane.dura.save(to));
+        if let Some(Bleeder { wound, .. }) = &self.bleeder {
+            let now = &self.wound.bleeding;
+            to.extend([now.rate_ml_per_min, now.worst_ml_per_min].map(|rate| u64::from(rate.to_bits())));
+            wound.save(to);
+        }
+        true
+    }
+
+    /// An empty list with room for all that [`save`](Self::save) may append.
+    pub fn room_to_save(&self) -> Vec<u64> {
+        let dura = self.dura.as_ref().map_or(0, |membrane| membrane.dura.most_words());
+        Vec::with_capacity(16 + 41 * self.loads.fills.len() + self.wound.bleeding.stains.len() + dura)
+    }
+
+    /// Takes over, before the first step, what a stage of the same brain saved; times are
+    /// `later_ms` later here. `None`, and no change, if it does not fit.
+    pub fn restore(&mut self, words: &mut impl Iterator<Item = u64>, later_ms: f64) -> Option<()> {
+        let [opened_ms, taken_mm3] = [f64::from_bits(words.next()?), f64::from_bits(words.next()?)];
+        let tets = words.next().filter(|tets| *tets == self.loads.fills.len() as u64)? as usize;
+        let fills: Vec<u16> = words.take(tets).map(|fill| fill as u16).collect();
+        (fills.len() == tets).then_some(())?;
+        let mut dura = self.dura.as_ref().map(|membrane| membrane.dura.clone());
+        dura.as_mut().map_or(Some(()), |dura| dura.restore(words, later_ms))?;
+        if let Some(bleeder) = &mut self.bleeder {
+            let rates = [f32::from_bits(words.next()? as u32), f32::from_bits(words.next()? as u32)];
+            let gone = (0u32..).zip(&fills).filter(|(_, fill)| **fill == 0).map(|(tet, _)| tet);
+            bleeder.wound.restore(words, gone, later_ms)?;
+            self.wound.bleeding.worst_ml_per_min = rates[1];
+            bleeder.tell(rates[0], &mut self.wound.bleeding);
+        }
+        if let Some((membrane, dura)) = self.dura.as_mut().zip(dura) {
+            membrane.dura = dura;
+            membrane.tell(&mut self.wound.dura);
+        }
+        if let Some(aspirator) = &mut self.aspirator {
+            aspirator.restore(&fills, taken_mm3);
+            for tool in &mut self.tools {
+                aspirator.thinned.iter().for_each(|&tet| tool.thin(tet, fills[tet as usize]));
+            }
+            self.loads.fills = fills;
+        }
+        self.settling.opened_ms = Some(opened_ms + later_ms).filter(|ms| ms.is_finite());
+        Some(())
+    }
+
     /// Returns the surface patch for the haptic thread.
     pub fn patch(&self) -> &SurfacePatch {
         &self.patch
@@ -295,6 +350,8 @@ mod tests {
         let tool = Tool::aspirator();
         let stage = CollisionStage::with_tools(&[tool], &mesh, &Config::default(), None).unwrap();
         let mut stage = stage.aspirating(&mesh, &rates).unwrap();
+        let other = CollisionStage::with_tools(&[tool], &mesh, &Config::default(), None).unwrap();
+        let mut other = other.aspirating(&mesh, &rates).unwrap();
         let config = Solver { averaged_pressure: true, ..Solver::default() };
         let mut solver =
             SolverStage::new(Box::new(Tled::new(&Body::uniform(mesh, fixed, Material::BRAIN), &config).unwrap()));
@@ -318,6 +375,12 @@ mod tests {
         assert!(jump < 0.005, "the force jumps by {jump} N");
         let faults = solver.solver_faults();
         assert_eq!((faults.limited, faults.non_finite, faults.skipped_ms), (0, 0, 0.0), "{faults:?}");
+        let (mut words, room) = (stage.room_to_save(), stage.room_to_save().capacity());
+        assert!(
+            stage.save(&mut words) && words.capacity() == room && other.restore(&mut [].into_iter(), 0.0).is_none()
+        );
+        other.restore(&mut words.into_iter(), 0.0).unwrap();
+        assert!(other.loads().fills == stage.loads().fills && other.aspirated_mm3() == stage.aspirated_mm3());
         let fills = &stage.loads().fills;
         let left: f64 =
             fills.iter().map(|f| f64::from(*f) / 65_535.0).sum::<f64>() * 24.0 * 24.0 * 18.0 / fills.len() as f64;

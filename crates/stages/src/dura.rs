@@ -57,7 +57,7 @@ impl DuraState {
 
 /// The dura, the bone above it, and its account.
 pub(crate) struct Membrane {
-    dura: Dura,
+    pub dura: Dura,
     bone: Arc<BoneVolume>,
     /// The node whose bone is looked up next.
     next: usize,

@@ -110,6 +110,22 @@ impl Flap {
         }
     }
 
+    /// Takes over a flap of the same bone that was lifted elsewhere: takes these voxels away, with
+    /// what was there, HU. Without any it looks whether it is free. Not for a tick.
+    pub fn restore(&mut self, bone: &BoneVolume, lifted: &[(IVec3, i16)]) {
+        self.stroke = true;
+        if lifted.is_empty() {
+            return;
+        }
+        self.search.restart();
+        self.search.step(bone, usize::MAX);
+        for &(voxel, hu) in lifted.iter().take(self.lifted.capacity()) {
+            self.lifted.push(Lifted { voxel, hu: bone.ct(voxel) });
+            bone.set_hu(voxel, hu);
+        }
+        (self.at, self.reported) = (State::Away, true);
+    }
+
     /// Runs a tick, after the contact with bone; returns a notice. `cut`: bone was removed in this
     /// tick, `hinders`: why the flap cannot be moved now, `below`: ends of the line below the tool.
     pub fn tick(

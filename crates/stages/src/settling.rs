@@ -53,7 +53,7 @@ const LEVELS: usize = 64;
 #[derive(Clone, Copy, Debug)]
 pub struct Settling {
     force: Force,
-    opened_ms: Option<f64>,
+    pub(crate) opened_ms: Option<f64>,
 }
 
 /// What acts.

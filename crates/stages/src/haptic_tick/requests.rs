@@ -8,6 +8,9 @@ use crate::program::Phase;
 use crate::second_hand::SecondHand;
 use crate::tray::Change;
 use crate::undo::{Answer, Place, Stroke};
+use glam::IVec3;
+use std::sync::Arc;
+use trepan_bone::BoneVolume;
 use trepan_geometry::{Buttons, Pose, ToolKind, ToolState, Vec3};
 
 /// Ends of the line along the shaft on which a piece of bone is lifted, from the tip, mm.
@@ -38,6 +41,25 @@ impl HapticStage {
     pub fn is_open(&self) -> bool {
         let lifted = self.flap.as_ref().is_some_and(Flap::is_away);
         lifted || self.bone.is_none() || self.holes > 0 || !self.config.opening_needed
+    }
+
+    /// Takes over the operation of another session before the first tick: the tool's proxy, whether
+    /// the bone is open, what was removed, mm³. The voxels of a lifted flap come with what is there
+    /// now, HU. What tools cut is in the bone already; no stroke of it can be undone.
+    pub fn restore(&mut self, proxy: Pose, is_open: bool, removed_mm3: f64, lifted: &[(IVec3, i16)]) {
+        if let (Some(bone), Some(flap)) = (&self.bone, &mut self.flap) {
+            flap.restore(bone, lifted);
+        }
+        self.holes = is_open.into();
+        self.scores.bone_removed_mm3 = removed_mm3;
+        self.proxy = proxy;
+        self.last_valid.world_from_tool = proxy;
+        self.rigid.iter_mut().flatten().for_each(|rigid| rigid.reset(proxy));
+    }
+
+    /// The bone, which this stage writes.
+    pub fn bone(&self) -> Option<&Arc<BoneVolume>> {
+        self.bone.as_ref()
     }
 
     /// Changes the tool on request, if the present one touches nothing. The first tick reports
