@@ -41,6 +41,8 @@ const REACH_MM: f32 = 7.0;
 const BELOW: f32 = 2e-3;
 /// Way of the brain below that moves the sheet, mm, numerical.
 const STIRS_MM: f32 = 0.05;
+/// Cosine up to which a force points inwards rather than aside, numerical.
+const INWARDS: f32 = 0.7;
 /// Time over which the force of a touch comes and goes, ms, numerical.
 const EASES_MS: f64 = 20.0;
 /// Time for which the sheet moves on after the last touch, ms, numerical.
@@ -217,6 +219,11 @@ impl Dura {
     /// Whether fluid can leave.
     pub fn is_open(&self) -> bool {
         self.account.opened_ms.is_some()
+    }
+
+    /// Whether the tool pressed it inwards in the last step.
+    pub fn is_pressed(&self) -> bool {
+        self.touched && self.force.dot(self.outward) > INWARDS * self.force.length()
     }
 
     /// Force on the tool in the last step, N.

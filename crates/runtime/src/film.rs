@@ -182,6 +182,13 @@ impl Filming {
     }
 }
 
+/// Voxels and nodes of the cut that are not as they were scanned.
+pub(crate) fn all_changes(bone: &Arc<BoneVolume>) -> (Vec<SceneChange>, Vec<SceneChange>) {
+    let mut carved = Carved::of(Arc::clone(bone));
+    carved.versions.fill(0);
+    carved.changes()
+}
+
 /// A skull that is carved, and its state at the last shot.
 struct Carved {
     bone: Arc<BoneVolume>,

@@ -16,6 +16,7 @@
 
 pub mod clock;
 pub mod film;
+pub mod joining;
 mod journal;
 pub mod lesson;
 pub mod lockstep;
@@ -28,7 +29,7 @@ pub use watch::WatchError;
 use crate::film::{Filming, Shot};
 use crate::journal::Written;
 use crate::stop::Stop;
-use crate::watch::Share;
+use crate::watch::{Share, Watching};
 use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
@@ -58,6 +59,8 @@ pub struct Run<'a> {
     pub recorder: Recorder,
     /// Publishes the records, where the session is shared.
     pub share: Option<Share>,
+    /// The session that is watched: its wound is taken over first.
+    pub watching: Option<Watching>,
     /// Film of a live session, and the file that it goes to.
     pub scene: Option<(Filming, SceneWriter)>,
     /// Ends the session.

@@ -14,6 +14,7 @@
 //! force is set to zero and the device closed in every case, also when a loop panics.
 
 use crate::clock::{Clock, Schedule, Waits};
+use crate::joining::{self, StateAsked, StateSender};
 use crate::journal::{Journal, JournalSenders, journal};
 use crate::stop::Stop;
 use crate::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
@@ -101,6 +102,7 @@ fn collision_loop(
             loads.fills.clone_from(&stage.loads().fills);
         });
         ends.wound.write(|wound| wound.copy_from(stage.wound()));
+        ends.asked.iter_mut().for_each(|asked| asked.answer(&stage));
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;
         times.add_us(record.compute_us);
@@ -153,10 +155,16 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
 /// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
 /// on the calling thread.
 pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
-    let Run { stages, start, recorder, share, scene, stop } = run;
+    let Run { mut stages, start, recorder, mut share, watching, scene, stop } = run;
+    let joined = watching.and_then(|watching| joining::join(&watching.name, &mut stages, stop));
+    joined.iter().for_each(|text| tracing::warn!("{text}"));
     let clock = Clock::start();
-    let cells = Cells::new(&stages, start);
+    let mut cells = Cells::new(&stages, start);
     let (senders, receivers) = journal(stages.haptic.force_scale());
+    let states = share.as_mut().and_then(|share| share.states.take());
+    let states = states.map(|states| StateSender::new(states, &stages, *cells.view.1.latest().0));
+    let (states, kept, asked) =
+        states.map_or((None, None, None), |(states, kept, asked)| (Some(states), Some(kept), Some(asked)));
     let JournalSenders { ticks, second: seconds, notices, collisions, solver } = senders;
     let Stages { haptic, second, tissue } = stages;
     let owned = |device| HapticDeviceOwner { device, stop: stop.clone() };
@@ -174,14 +182,15 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
         let (tool, view, patch) = (cells.tool.0, cells.view.0, cells.patch.1);
-        let ends = HapticEnds { tool, view, filmed: cells.filmed.0, patch, ticks, notices };
+        let ends = HapticEnds { tool, view, filmed: cells.filmed.0, kept, patch, ticks, notices };
         let brain = simulating.then_some(cells.filmed_soft.1);
         let filming = scene.map(|(film, writer)| scope.spawn(move || film.live(writer, cells.filmed.1, brain, stop)));
+        let stating = states.map(|states| scope.spawn(move || states.live(clock, stop)));
         let feeling = scope.spawn(move || haptic_loop(hands, ends, clock, pace, stop));
         let solving = tissue.map(|tissue| {
             let (tool, soft, patch, loads) = (cells.tool.1, cells.soft.1, cells.patch.0, cells.loads.0);
             let wound = cells.wound.0;
-            let ends = CollisionEnds { tool, soft, patch, loads, wound, records: collisions };
+            let ends = CollisionEnds { tool, soft, patch, loads, wound, asked, records: collisions };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
             let (soft, shown, filmed) = (cells.soft.0, cells.shown.0, cells.filmed_soft.0);
             let ends = SolverEnds { loads: cells.loads.1, soft, shown, filmed, records: solver };
@@ -192,6 +201,7 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
         let panicked = || vec!["the haptic thread panicked; force set to zero, device closed".to_string()];
         let mut outcome = feeling.join().unwrap_or_else(|_| Outcome { remarks: panicked(), ..Outcome::default() });
         outcome.remarks.extend(filming.and_then(|filming| filming.join().ok().flatten()));
+        outcome.remarks.extend(stating.and_then(|stating| stating.join().ok().flatten()).into_iter().chain(joined));
         let solver = solving.map(|(colliding, solving)| {
             let solver = solving.join().unwrap_or_default();
             let (collision_times, wound) = colliding.join().unwrap_or_default();
@@ -241,6 +251,7 @@ struct HapticEnds {
     tool: Writer<ToolSample>,
     view: Writer<View>,
     filmed: Writer<View>,
+    kept: Option<Writer<View>>,
     patch: Reader<Numbered<SurfacePatch>>,
     ticks: Sender<TickRecord>,
     notices: Sender<Notice>,
@@ -252,6 +263,7 @@ impl HapticEnds {
         self.tool.set(tick.sample);
         self.view.set(view);
         self.filmed.set(view);
+        self.kept.iter_mut().for_each(|kept| _ = kept.set(view));
         self.ticks.send(tick.record);
     }
 }
@@ -303,6 +315,7 @@ struct CollisionEnds {
     patch: Writer<Numbered<SurfacePatch>>,
     loads: Writer<Numbered<Loads>>,
     wound: Writer<Wound>,
+    asked: Option<StateAsked>,
     records: Sender<CollisionRecord>,
 }
 

@@ -17,9 +17,10 @@
 //! # Practice
 //! Sending and receiving cost the recording thread a few µs a tick; the haptic loop is not
 //! involved. The watcher is given the same images, and takes models and settings from the trainee's
-//! header: nothing is measured or chosen twice, and a prepared case comes from the cache. Bone
-//! drilled before the watcher joined is not visible to it. Watching ends three seconds after the
-//! last tick.
+//! header: nothing is measured or chosen twice, and a prepared case comes from the cache. Who joins
+//! late begins with the trainee's bone, tissue and blood ([`joining`](crate::joining)); a state
+//! that does not fit is refused with a remark. The second hand is not seen. Watching ends three
+//! seconds after the last tick.
 //!
 //! # When not to use it
 //! Alone, between machines: shared memory is local to a machine. Run iceoryx2's tunnel
@@ -37,7 +38,7 @@ use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, Topic, TopicError};
-use trepan_link::wire::{EventRecord, SessionHeader, TeacherRecord, TickRecord};
+use trepan_link::wire::{EventRecord, SessionHeader, StateRecord, TeacherRecord, TickRecord};
 
 /// Session that cannot be shared or watched, with the flag and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +62,8 @@ pub struct Share {
     pub(crate) events: Publisher<EventRecord>,
     /// Publishes the header.
     pub(crate) headers: Publisher<SessionHeader>,
+    /// Publishes the state, until a live session takes it for a thread of its own.
+    pub(crate) states: Option<Publisher<StateRecord>>,
     /// Receives the teacher's requests.
     pub(crate) teacher: Listener,
     _session: Session,
@@ -77,7 +80,8 @@ impl Share {
             let (teacher, readers) = Listener::join(&session)?;
             let (ticks, events, mut headers) = (session.publisher()?, session.publisher()?, session.publisher()?);
             headers.send(header)?;
-            Ok((Self { ticks, events, headers, teacher, _session: session }, readers))
+            let states = Some(session.publisher()?);
+            Ok((Self { ticks, events, headers, states, teacher, _session: session }, readers))
         };
         open().map_err(|fault| WatchError(format!("--share {name}: {fault}")))
     }
@@ -97,7 +101,7 @@ pub struct Watched {
 /// Name of the watched session, and whether it has ended.
 #[derive(Clone)]
 pub struct Watching {
-    name: String,
+    pub(crate) name: String,
     over: Arc<AtomicBool>,
 }
 

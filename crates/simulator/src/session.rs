@@ -229,7 +229,7 @@ impl Session {
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
         let devices = device.map(|first| Devices { first, second: second_device });
-        let run = Run { stages, start, recorder, share, scene, stop: &stop };
+        let run = Run { stages, start, recorder, share, watching: watching.clone(), scene, stop: &stop };
         let outcome = self.loops(run, devices, |inputs| {
             album = self.picture(inputs, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });

@@ -62,7 +62,7 @@ impl CollisionStage {
     fn aspirate(&mut self, sample: &ToolSample, soft: &SoftFrame) {
         let Some(aspirator) = &mut self.aspirator else { return };
         let mut sample = *sample;
-        if self.dura.as_ref().is_some_and(Membrane::bears) {
+        if self.dura.as_ref().is_some_and(Membrane::covers) {
             sample.state.buttons.0 &= !Buttons::PEDAL.0;
         }
         let sample = &sample;

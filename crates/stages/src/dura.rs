@@ -76,9 +76,9 @@ impl Membrane {
         self.dura.is_open()
     }
 
-    /// Whether the tool lies on it, so that it cannot take tissue.
-    pub fn bears(&self) -> bool {
-        self.dura.force() != Vec3::ZERO || !self.is_open()
+    /// Whether it lies between the tool and the tissue.
+    pub fn covers(&self) -> bool {
+        !self.is_open() || self.dura.is_pressed()
     }
 
     /// Goes on to the tool's time, adds the force on the tool to the patch, and keeps account.
