@@ -43,8 +43,10 @@ const BELOW: f32 = 2e-3;
 const STIRS_MM: f32 = 0.05;
 /// Cosine up to which a force points inwards rather than aside, numerical.
 const INWARDS: f32 = 0.7;
-/// Time over which the force of a touch comes and goes, ms, numerical.
-const EASES_MS: f64 = 20.0;
+/// Change of the force where another triangle is met, N, from which on it is faded in, numerical.
+const JUMP_N: f32 = 0.02;
+/// Time over which it is faded in, ms, numerical.
+const EASES_MS: f64 = 30.0;
 /// Time for which the sheet moves on after the last touch, ms, numerical.
 const AWAKE_MS: f64 = 500.0;
 /// Time in which the tension goes once the sheet is open, ms, numerical.
@@ -100,8 +102,10 @@ pub struct Dura {
     left_ms: f64,
     awake_ms: f64,
     touched: bool,
-    /// Depth at which the present touch began, mm; it fades.
-    began_mm: f32,
+    /// The triangle that the tool met last, and its force there, N.
+    met: (Option<u32>, Vec3),
+    /// The force when the triangle changed, N, and its share, which fades.
+    held: (Vec3, f32),
     force: Vec3,
     held_ms: Option<f64>,
     blade: Blade,
@@ -141,7 +145,8 @@ impl Dura {
             left_ms: 0.0,
             awake_ms: f64::NEG_INFINITY,
             touched: false,
-            began_mm: 0.0,
+            met: (None, Vec3::ZERO),
+            held: (Vec3::ZERO, 0.0),
             force: Vec3::ZERO,
             held_ms: None,
             blade: Blade::default(),
@@ -331,23 +336,18 @@ impl Dura {
             self.awake_ms = now_ms + AWAKE_MS;
         }
         if now_ms > self.awake_ms {
-            (self.force, self.left_ms) = (Vec3::ZERO, 0.0);
+            (self.force, self.held.1, self.left_ms) = (Vec3::ZERO, 0.0, 0.0);
             return Vec3::ZERO;
         }
         self.left_ms += passed_ms;
-        let eased = (-passed_ms / EASES_MS).exp() as f32;
-        self.began_mm *= eased;
         let (mut sum, mut steps, mut worst) = (Vec3::ZERO, 0.0f32, (self.law.tears_at, None));
         while self.left_ms >= DT_MS {
             self.left_ms -= DT_MS;
             steps += 1.0;
             sum += self.advance(touch.as_ref(), &mut worst);
         }
-        self.force = match touch {
-            Some(_) if steps > 0.0 => sum / steps,
-            Some(_) => self.force,
-            None => eased * self.force,
-        };
+        let now = if steps > 0.0 { sum / steps } else { self.met.1 };
+        self.feel(touch.map(|touch| touch.at.triangle), now, passed_ms);
         self.turn_normals();
         let through = touch.filter(|touch| touch.depth_mm > DEPTHS_MM[1]).map(|touch| touch.at.triangle);
         match worst.1.or(through) {
@@ -355,6 +355,17 @@ impl Dura {
             None => self.incise(touch.as_ref(), tip.is_some_and(|tip| tip.cuts)),
         }
         self.force
+    }
+
+    /// Takes the force of a touch so that the hand feels no jump where another triangle is met.
+    fn feel(&mut self, triangle: Option<u32>, now: Vec3, passed_ms: f64) {
+        let now = if triangle.is_some() { now } else { Vec3::ZERO };
+        if triangle != self.met.0 && self.force.distance(now) > JUMP_N {
+            self.held = (self.force, 1.0);
+        }
+        self.met = (triangle, now);
+        self.held.1 *= (-passed_ms / EASES_MS).exp() as f32;
+        self.force = now.lerp(self.held.0, self.held.1);
     }
 
     fn tear(&mut self, triangle: u32) {
@@ -445,7 +456,7 @@ impl Dura {
             let corners = self.sheet.triangles[touch.at.triangle as usize].corners;
             let at: Vec3 = (0..3).map(|k| touch.at.weights[k] * self.sheet.nodes[corners[k] as usize].place).sum();
             let depth_mm = touch.tip.radius_mm - (touch.tip.at - self.middle - at).dot(touch.direction);
-            on_tool = TOUCH * (depth_mm - self.began_mm).max(0.0) * touch.direction;
+            on_tool = TOUCH * depth_mm.max(0.0) * touch.direction;
             for (corner, weight) in corners.into_iter().zip(touch.at.weights) {
                 self.sheet.nodes[corner as usize].force -= weight * on_tool;
             }
@@ -462,7 +473,7 @@ impl Dura {
         let at = tip.at - self.middle;
         let far_mm = tip.radius_mm + REACH_MM + 2.0 * self.edge_mm;
         let mut best: Option<(f32, u32, [f32; 3], Vec3)> = None;
-        for &t in &self.active {
+        for (t, _) in (0u32..).zip(&self.sheet.triangles).filter(|(_, triangle)| triangle.live) {
             let places = self.sheet.places(t);
             if places[0].distance_squared(at) < far_mm * far_mm {
                 let weights = closest_weights(places, at);
@@ -473,22 +484,19 @@ impl Dura {
                 }
             }
         }
-        let found = best.map(|(mm, triangle, weights, away)| {
+        let found = best.and_then(|(mm, triangle, weights, away)| {
             let at = Point { triangle, weights };
             let normal = self.sheet.mean(&at).normal;
+            // A blunt tool feels the edge of a leaf from any side, a blade does not.
             let is_edge = self.is_free_edge(&at);
-            let is_below = !is_edge && away.dot(normal) <= 0.0;
-            let depth_mm = if is_below { tip.radius_mm + mm } else { tip.radius_mm - mm };
-            let flat = is_below || mm < 0.3 * tip.radius_mm;
-            let direction = if flat { normal } else { away / mm };
-            Touch { at, direction, tip: *tip, depth_mm }
+            let aside = away + (0.3 * tip.radius_mm - mm).max(0.0) * normal;
+            let direction = if is_edge { aside.normalize_or(normal) } else { normal };
+            let depth_mm = tip.radius_mm - if is_edge { mm } else { away.dot(normal) };
+            (!is_edge || !tip.cuts).then_some(Touch { at, direction, tip: *tip, depth_mm })
         });
         // A blade that is in an incision meets its end from the side.
         let most_mm = if self.touched || tip.cuts { f32::INFINITY } else { DEPTHS_MM[0] };
         let touch = found.filter(|touch| touch.depth_mm > 0.0 && touch.depth_mm < most_mm);
-        if let Some(touch) = touch.filter(|_| !self.touched) {
-            self.began_mm = touch.depth_mm;
-        }
         self.touched = touch.is_some();
         touch
     }

@@ -302,7 +302,8 @@ impl Sheet {
         }
     }
 
-    /// Takes over what a sheet over the same place saved; `None`, and no change, if it does not fit.
+    /// Takes over what a sheet over the same place saved; `None`, and no change, if it does not
+    /// fit.
     pub fn restore(&mut self, words: &mut impl Iterator<Item = u64>) -> Option<()> {
         let mut pair = || words.next().map(|word| [(word >> 32) as u32, word as u32]);
         let count = pair()?[1];

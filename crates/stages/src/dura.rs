@@ -132,3 +132,68 @@ impl Membrane {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision_step::{CollisionStage, SoftFrame};
+    use crate::program::Program;
+    use trepan_deformable::Config;
+    use trepan_geometry::{Pose, ToolState};
+    use trepan_soft::boxes;
+    use trepan_volume::VoxelVolume;
+
+    /// A block of brain, 48 mm wide and 16 mm high, under bone with a hole of 12 mm over its middle.
+    fn stage() -> (CollisionStage, SoftFrame) {
+        let mesh = boxes::split_box([12, 12, 4], Vec3::new(48.0, 48.0, 16.0));
+        let mut plate = VoxelVolume::isotropic([48, 48, 30], Vec3::ZERO, 1.0, 0i16);
+        for (at, hu) in plate.data.iter_mut().enumerate() {
+            let place = [at % 48, at / 48 % 48, at / (48 * 48)].map(|i| i as f32);
+            let is_hole = (place[0] - 24.0).hypot(place[1] - 24.0) < 12.0;
+            *hu = if (18.0..24.0).contains(&place[2]) && !is_hole { 1000 } else { 0 };
+        }
+        let bone = Arc::new(BoneVolume::new(&plate, 300).unwrap());
+        let dura = Dura::over(&mesh, Vec3::new(24.0, 24.0, 24.0), Vec3::Z, 20.0).unwrap();
+        let stage = CollisionStage::new(Program::Integrated, &mesh, &Config::default(), None).unwrap();
+        let stage = stage.aspirating(&mesh, &vec![0.05; mesh.tets.len()]).unwrap().covered(dura, bone);
+        let velocities = vec![Vec3::ZERO; mesh.positions.len()];
+        (stage, SoftFrame { step: 1, positions: mesh.positions, velocities, ..SoftFrame::default() })
+    }
+
+    /// Leads a tool in a straight line in a second; the largest force.
+    fn lead(stage: &mut CollisionStage, brain: &SoftFrame, slot: usize, way: [Vec3; 2], from: u64) -> f32 {
+        let tool = Program::Integrated.tray()[slot];
+        let mut most_n = 0.0f32;
+        for tick in from..from + 1000 {
+            let at = way[0].lerp(way[1], (tick - from) as f32 / 999.0);
+            let mut state = ToolState::at(Pose::from_translation(at));
+            (state.time_ms, state.buttons) = (tick as f64, Buttons::PEDAL);
+            stage.step(&ToolSample { tick, state, tool, slot, drilling: false, second: None }, brain);
+            most_n = most_n.max(stage.patch().force_n);
+        }
+        most_n
+    }
+
+    #[test]
+    fn an_aspirator_takes_nothing_until_a_scalpel_has_opened_the_dura() {
+        let (mut stage, brain) = stage();
+        let [aspirator, scalpel] = [6, 8];
+        assert_eq!(Program::Integrated.tray()[scalpel].kind, ToolKind::Scalpel);
+        let at = |x: f32, z: f32| Vec3::new(x, 24.3, z);
+        let pressed_n = lead(&mut stage, &brain, aspirator, [at(24.0, 22.0), at(24.0, 15.5)], 1);
+        assert!(stage.aspirated_mm3() == 0.0 && pressed_n > 0.5 && stage.wound().dura.opened_s.is_none());
+        let up_n = lead(&mut stage, &brain, aspirator, [at(24.0, 15.5), at(24.0, 24.0)], 1001);
+        assert!(up_n > 0.0 && stage.patch().force_n == 0.0, "free again");
+        lead(&mut stage, &brain, scalpel, [at(14.0, 20.0), at(14.0, 15.0)], 2001);
+        lead(&mut stage, &brain, scalpel, [at(14.0, 15.0), at(34.0, 15.0)], 3001);
+        lead(&mut stage, &brain, scalpel, [at(34.0, 15.0), at(34.0, 30.0)], 4001);
+        let dura = stage.wound().dura.clone();
+        assert!(dura.incised_mm > 15.0 && dura.opened_s.is_some_and(|s| (3.0..4.0).contains(&s)), "{dura:?}");
+        // Another tool: sutures hold the leaves back.
+        lead(&mut stage, &brain, aspirator, [at(24.0, 40.0), at(24.0, 22.0)], 5001);
+        lead(&mut stage, &brain, aspirator, [at(24.0, 22.0), at(24.0, 15.0)], 6001);
+        assert!(stage.aspirated_mm3() > 1.0 && stage.wound().dura.torn == 0, "{} mm³", stage.aspirated_mm3());
+        let moved = stage.wound().dura.places.iter().zip(&dura.places).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        assert!(moved > 2.0, "{moved} mm");
+    }
+}

@@ -18,7 +18,7 @@ use trepan_stages::{CollisionStage, Phase, Program, SoftFrame, SolverStage, Tick
 use trepan_trials_scenes::case;
 
 /// Length of the operation, bone included, ms.
-const END_MS: u64 = 350_000;
+const END_MS: u64 = 390_000;
 /// Ingredients of the quality `auto`.
 const INGREDIENTS: &str = "element=locking-free,law=stiffening,pia-arachnoid=on,relaxation=solid-and-fluid,friction=0.1,\
                            support=anchored";
@@ -83,6 +83,9 @@ fn judge(
     let (whole, left) = (brain.left_mm3(&vec![u16::MAX; fills.len()]), brain.left_mm3(fills));
     let taken = |at: usize| whole[at] - left[at];
     let bleeding = &collision.wound().bleeding;
+    let dura = &collision.wound().dura;
+    let length_mm = |line: &Vec<Vec3>| line.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f32>();
+    let planned_mm: f32 = session.plan().incisions.iter().map(length_mm).sum();
     let unaccounted = (bleeding.bled_ml - bleeding.sucked_ml - bleeding.lies_ml).abs() / bleeding.bled_ml;
     let (all_mm3, tumour) = (whole.iter().sum::<f64>(), TissueClass::Tumour as usize);
     let gone_mm3 = (0..whole.len()).map(taken).sum::<f64>();
@@ -98,6 +101,7 @@ fn judge(
             .metric("bled_ml", bleeding.bled_ml)
             .metric("worst_ml_per_min", bleeding.worst_ml_per_min.into())
             .metric("sources_closed", bleeding.coagulated.into())
+            .metric("incised_mm", dura.incised_mm.into())
             .metric("inverted", faults.inverted as f64),
     );
     let put_right = (faults.inverted + faults.limited + faults.non_finite) as f64 + faults.skipped_ms;
@@ -106,6 +110,8 @@ fn judge(
         Gate::at_most(format!("{name}: volume not accounted for, of the brain"), lost, 1e-6),
         Gate::at_most(format!("{name}: elements, nodes and ms that the solver put right"), put_right, 0.0),
         Gate::at_most(format!("{name}: blood not accounted for"), unaccounted, 1e-3),
+        Gate::at_least(format!("{name}: share of the dura's incisions"), (dura.incised_mm / planned_mm).into(), 0.9),
+        Gate::at_most(format!("{name}: tears of the dura"), dura.torn.into(), 0.0),
         Gate::at_most(format!("{name}: bleeding at the end, ml/min"), bleeding.rate_ml_per_min.into(), 1.0),
         Gate::at_most(format!("{name}: largest change of force in a tick, N"), felt[1], 0.05),
     ]);
