@@ -65,8 +65,7 @@ pub struct Options {
     /// Watch the session that runs with --share NAME, with the same case
     #[arg(help_heading = "Session", long, value_name = "NAME", conflicts_with_all = ["device", "share"])]
     pub watch: Option<String>,
-    /// Language of the window: en, de, or the name of a file in the folder `languages` beside the
-    /// settings
+    /// Language of the window: en, de, or a file in the folder `languages` beside the settings
     #[arg(help_heading = "Session", long, value_name = "LANGUAGE")]
     pub language: Option<String>,
     /// Run without a window
@@ -104,8 +103,7 @@ pub struct Options {
     /// Also write the drilled skull's surface as drilled.stl, some hundred MB
     #[arg(help_heading = "Files", long)]
     pub stl: bool,
-    /// Also write drilled-fine.nii.gz: the skull around the removed bone, in voxels of 0.5 mm or
-    /// less
+    /// Also write drilled-fine.nii.gz: the skull around the removed bone, in voxels of 0.5 mm
     #[arg(help_heading = "Files", long)]
     pub drilled_fine: bool,
     /// Accuracy of bone, brain and picture [default: auto; a replay's as recorded]. Auto measures
@@ -169,8 +167,7 @@ pub struct Options {
     /// commas [default: vessel]
     #[arg(help_heading = "Session", long, value_name = "CLASS,...", value_delimiter = ',')]
     pub forbid: Option<Vec<TissueClass>>,
-    /// Replay only every Nth recording of a folder (--device replay:FOLDER), from the Ith on, as in
-    /// 2/8
+    /// Replay only every Nth recording of --device replay:FOLDER, from the Ith on, as in 2/8
     #[arg(help_heading = "Files", long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<(usize, usize)>,
     /// Haptic tick rate, Hz [default: 1000; a replay's as recorded]

@@ -143,7 +143,7 @@ mod tests {
     use trepan_soft::boxes;
     use trepan_volume::VoxelVolume;
 
-    /// A block of brain, 48 mm wide and 16 mm high, under bone with a hole of 12 mm over its middle.
+    /// A block of brain, 48 mm wide and 16 mm high, under bone with a hole of 12 mm.
     fn stage() -> (CollisionStage, SoftFrame) {
         let mesh = boxes::split_box([12, 12, 4], Vec3::new(48.0, 48.0, 16.0));
         let mut plate = VoxelVolume::isotropic([48, 48, 30], Vec3::ZERO, 1.0, 0i16);
