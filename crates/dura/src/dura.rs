@@ -46,7 +46,7 @@ const INWARDS: f32 = 0.7;
 /// Change of the force where another triangle is met, N, from which on it is faded in, numerical.
 const JUMP_N: f32 = 0.02;
 /// Time over which it is faded in, ms, numerical.
-const EASES_MS: f64 = 30.0;
+const EASES_MS: f64 = 40.0;
 /// Time for which the sheet moves on after the last touch, ms, numerical.
 const AWAKE_MS: f64 = 500.0;
 /// Time in which the tension goes once the sheet is open, ms, numerical.
@@ -226,6 +226,11 @@ impl Dura {
         self.account.opened_ms.is_some()
     }
 
+    /// Whether it moved in the last step.
+    pub fn moves(&self) -> bool {
+        self.now_ms <= self.awake_ms
+    }
+
     /// Whether the tool pressed it inwards in the last step.
     pub fn is_pressed(&self) -> bool {
         self.touched && self.force.dot(self.outward) > INWARDS * self.force.length()
@@ -251,13 +256,16 @@ impl Dura {
         }
     }
 
-    /// Lets the sheet rest on the brain as it is now, by the places of its nodes, world mm; without
-    /// all of them nothing changes.
+    /// Lets the sheet rest on the brain as it is now, by the places of its nodes, world mm, until
+    /// sutures hold it; without all of them nothing changes.
     pub fn rest_on(&mut self, brain: &[Vec3]) {
+        if self.held_ms.is_some() {
+            return;
+        }
         let mut most_mm = 0.0f32;
         for node in &mut self.sheet.nodes {
             let risen = node.foot.and_then(|foot| foot.risen_mm(brain, self.outward));
-            if let Some(risen_mm) = risen.filter(|_| node.suture.is_none()) {
+            if let Some(risen_mm) = risen {
                 most_mm = most_mm.max((risen_mm - node.risen_mm).abs());
                 if (risen_mm - node.risen_mm).abs() > STIRS_MM {
                     node.risen_mm = risen_mm;

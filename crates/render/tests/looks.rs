@@ -14,7 +14,8 @@ use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::Faults;
 use trepan_mesh::TetMesh;
 use trepan_render::{
-    Camera, Cut, Frame, Image, Overlay, Paint, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo, StereoLook,
+    Camera, Cut, Frame, Image, Leaves, Overlay, Paint, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo,
+    StereoLook,
 };
 use trepan_volume::VoxelVolume;
 
@@ -62,6 +63,12 @@ fn blueish([r, _, b]: [i32; 3]) -> bool {
 /// Blood of 0 to 2 mm on the nodes of the cube, and burns.
 const STAINS: [u8; 8] = [0, 20, 60, 200, 255, 0, 255, 10];
 
+/// A sheet over the cube with one corner lifted, where it was and where it is.
+const SHEET: [[Vec3; 4]; 2] = [
+    [Vec3::new(-6.0, 13.0, -6.0), Vec3::new(-6.0, 13.0, 6.0), Vec3::new(6.0, 13.0, 6.0), Vec3::new(6.0, 13.0, -6.0)],
+    [Vec3::new(-6.0, 13.0, -6.0), Vec3::new(-6.0, 13.0, 6.0), Vec3::new(1.0, 18.0, 1.0), Vec3::new(6.0, 13.0, -6.0)],
+];
+
 /// Every look, alone and all together.
 fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame<'a>)> {
     let pose = Pose::from_parts(
@@ -77,6 +84,7 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
     };
     let cut = Some(Cut { point: Vec3::new(0.0, 0.0, 2.0), normal: Vec3::new(0.1, 0.9, 0.5), bone: false });
     let open = cut.map(|cut| Cut { bone: true, ..cut });
+    let dura = Some(Leaves { rest: &SHEET[0], places: &SHEET[1], triangles: &[[0, 1, 2], [0, 2, 3]] });
     let stereo = |look| Some(Stereo { look, eye_distance_mm: 5.0 });
     let all = Frame { bone_paint: Some(paint), brain_paint: Some(paint), overlay, cut: open, ..base };
     vec![
@@ -89,6 +97,7 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
         ("tube and mill", Frame { tool: Some(Tool::aspirator()), second: Some((Tool::craniotome(), aside)), ..base }),
         ("tines", Frame { tool: Some(Tool::bipolar()), ..base }),
         ("blood and a burn", Frame { brain_stains: Some(&STAINS), show_bone: false, ..base }),
+        ("dura", Frame { dura, show_bone: false, ..base }),
         ("both eyes", Frame { stereo: stereo(StereoLook::SideBySide), ..all }),
         ("anaglyph", Frame { stereo: stereo(StereoLook::Anaglyph), ..all }),
         ("all with slices", Frame { slices: SliceLook::default(), ..all }),

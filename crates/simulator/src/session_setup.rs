@@ -41,7 +41,7 @@ const SINKS: f32 = 0.7;
 /// How far the dura is modelled beyond the planned opening, mm, numerical.
 const AROUND_MM: f32 = 8.0;
 /// Share of the opening's radius that is incised, and parts of an incision, numerical.
-const INCISED: f32 = 0.85;
+const INCISED: f32 = 0.97;
 const INCISION_PARTS: u8 = 10;
 
 /// Patient, plan, settings and models of a session.

@@ -102,7 +102,9 @@ impl Membrane {
             patch.couple_mm *= share;
             patch.normal_velocity *= share;
         }
-        self.tell(now);
+        if self.dura.moves() {
+            self.tell(now);
+        }
     }
 
     /// Looks up for a few nodes whether bone holds them.
