@@ -256,8 +256,9 @@ impl Dura {
         }
     }
 
-    /// Lets the sheet rest on the brain as it is now, by the places of its nodes, world mm, until
-    /// sutures hold it; without all of them nothing changes.
+    /// Lets the sheet rest on the brain as it is now, by the places of its nodes, world mm.
+    ///
+    /// Once sutures hold it, or without all of the nodes, nothing changes.
     pub fn rest_on(&mut self, brain: &[Vec3]) {
         if self.held_ms.is_some() {
             return;
