@@ -2,18 +2,18 @@
 //!
 //! # Practice
 //! Each record type has a topic in Trepan's protobuf schemas (`/tick`, `/second`, `/collision`,
-//! `/solver`, `/event`, `/score`); `/tool` and `/log` use Foxglove's for viewers. The fields of
-//! `/score` are named in the file, as a session has them. Chunks are compressed with
-//! LZ4 and closed after [`MAX_CHUNK_BYTES`] or [`MAX_CHUNK_MS`] of session time, whichever comes
-//! first, then handed to the operating system: a killed process loses the open chunk only. A tick
-//! takes 2 µs and 80 to 250 B, but 5 ms or the disk's latency when a chunk closes. So a recorder
-//! runs on its own thread, behind [`crate::queue`].
+//! `/solver`, `/event`, `/score`, and `/state` where a session joined another); `/tool` and `/log`
+//! use Foxglove's for viewers. The fields of `/score` are named in the file, as a session has them.
+//! Chunks are compressed with LZ4 and closed after [`MAX_CHUNK_BYTES`] or [`MAX_CHUNK_MS`] of
+//! session time, whichever comes first, then handed to the operating system: a killed process loses
+//! the open chunk only. A tick takes 2 µs and 80 to 250 B, but 5 ms or the disk's latency when a
+//! chunk closes. So a recorder runs on its own thread, behind [`crate::queue`].
 //!
 //! # Sources
 //! MCAP: <https://mcap.dev/spec>.
 
 use crate::protobuf::{Fields, encode, encode_numbers, file_descriptor_set, numbers_descriptor_set};
-use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, StateRecord, TickRecord};
 use crate::{LinkError, viewer};
 use foxglove::Encode;
 use mcap::records::{MessageHeader, Metadata};
@@ -58,7 +58,7 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
 }
 
 /// Number of channels.
-const CHANNELS: usize = 8;
+const CHANNELS: usize = 9;
 /// Name of the message of scores.
 const SCORE: &str = "trepan.Score";
 
@@ -142,6 +142,12 @@ impl<W: Write + Seek> Recorder<W> {
         self.advance(record.time_ms)?;
         self.foxglove(self.channels.log, &viewer::log(record, nanoseconds(record.time_ms)))?;
         self.message(self.channels.event, record)
+    }
+
+    /// Records the state that a session begins with: what another session had done before.
+    pub fn state(&mut self, record: &StateRecord) -> Result<(), LinkError> {
+        let channel = own_channel::<StateRecord, W>(&mut self.mcap, "/state");
+        self.message(channel.map_err(|error| write_error(&self.path, &error))?, record)
     }
 
     /// Records the present scores by name. The names of the first call count; later calls give

@@ -17,7 +17,8 @@
 //! Who joins waits up to 1.5 s for a state that is newer than the first tick it saw; without one
 //! nothing has changed. What happens from that state to its own first tick, some 0.1 s, is not
 //! seen. Its brain begins at rest and sags again, so that forces and blood may differ a little. A
-//! stroke from before cannot be undone there, and a replay of its recording lacks all that.
+//! stroke from before cannot be undone there. Its recording holds the state that it began with, and
+//! a replay begins with it too.
 
 use crate::clock::Clock;
 use crate::film::all_changes;
@@ -27,6 +28,7 @@ use glam::IVec3;
 use std::sync::Arc;
 use std::time::Duration;
 use trepan_bone::BoneVolume;
+use trepan_geometry::{Pose, Quat, Vec3};
 use trepan_link::SceneChange;
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::queue::{Receiver, Sender, bounded};
@@ -129,20 +131,39 @@ fn kind_of(bone: Option<&BoneVolume>) -> u64 {
     StateRecord::sum(&format!("{kind:?}").bytes().map(u64::from).collect::<Vec<_>>()).into()
 }
 
-/// Takes over the newest state of the session of a name before the loops begin. Returns what there
-/// is to say: why it was refused, with the remedy, or what a replay will lack.
-pub(crate) fn join(name: &str, stages: &mut Stages, stop: &Stop) -> Option<String> {
+/// Takes over the newest state of the session of a name before the loops begin. Returns it for the
+/// recording, if something had been done; else why it was refused, with the remedy.
+pub(crate) fn join(name: &str, stages: &mut Stages, stop: &Stop) -> Result<Option<StateRecord>, String> {
     let why = match newest(name, stop) {
-        _ if stop.asked() => return None,
+        _ if stop.asked() => return Ok(None),
         Err(fault) => fault.to_string(),
         Ok(None) => "no state arrives; run the same version on both sides, and no replay".into(),
         Ok(Some((state, tick))) => match restore(&state, &tick, stages) {
-            Ok(false) => return None,
-            Ok(true) => return Some(format!("a replay of this recording lacks what {name} had done before")),
+            Ok(is_other) => return Ok(is_other.then(|| begun(&state, &tick))),
             Err(why) => why.into(),
         },
     };
-    Some(format!("--watch {name}: what was done before is not seen: {why}"))
+    Err(format!("--watch {name}: what was done before is not seen: {why}"))
+}
+
+/// A state as a recording has it: with the tick that its session begins at in front.
+fn begun(state: &StateRecord, tick: &TickRecord) -> StateRecord {
+    let (at, turn) = (tick.proxy.translation, tick.proxy.rotation);
+    let pose = [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w].map(|part| u64::from(part.to_bits()));
+    let words: Words = [tick.time_ms.to_bits()].iter().chain(&pose).chain(&state.words).copied().collect();
+    StateRecord { checksum: StateRecord::sum(&words), words, ..*state }
+}
+
+/// Takes over what the session of a recording began with; else why not, and no change.
+pub(crate) fn begin(state: &StateRecord, stages: &mut Stages) -> Result<(), &'static str> {
+    let Some((front, words)) = state.words.split_first_chunk::<8>() else {
+        return Err("its state is damaged; record it again");
+    };
+    let [x, y, z, a, b, c, d] = [1, 2, 3, 4, 5, 6, 7].map(|part| f32::from_bits(front[part] as u32));
+    let proxy = Pose::from_parts(Vec3::new(x, y, z), Quat::from_xyzw(a, b, c, d));
+    let tick = TickRecord { time_ms: f64::from_bits(front[0]), proxy, ..TickRecord::default() };
+    let checksum = if state.checksum == StateRecord::sum(&state.words) { StateRecord::sum(words) } else { 0 };
+    restore(&StateRecord { words: words.into(), checksum, ..*state }, &tick, stages).map(drop)
 }
 
 /// Waits for a state that is newer than the first tick, with the newest tick.
@@ -254,7 +275,7 @@ mod tests {
     }
 
     /// A watcher of a session joins it at its tick 1000; what it has to say.
-    fn joined(name: &str, trainee: &Stages, watcher: &mut Stages) -> Option<String> {
+    fn joined(name: &str, trainee: &Stages, watcher: &mut Stages) -> Result<Option<StateRecord>, String> {
         let (name, over) = (format!("{name}-{}", std::process::id()), Stop::default());
         let session = Session::join(&name).unwrap();
         let (tool, mut ticks) = (Program::Integrated.tray()[0], session.publisher().unwrap());
@@ -300,7 +321,13 @@ mod tests {
             ms += 1;
         }
         assert!(wound(&trainee).0.contains(&0) && wound(&trainee).2.bled_ml > 0.0, "{:?}", wound(&trainee).1);
-        assert!(joined("wound", &trainee, &mut watcher).unwrap().starts_with("a replay of this recording lacks"));
+        let state = joined("wound", &trainee, &mut watcher).unwrap().unwrap();
+        // A replay begins with the same, from its recording.
+        let mut replay = stages();
+        begin(&state, &mut replay).unwrap();
+        assert!(bone(&replay) == bone(&watcher) && wound(&replay) == wound(&watcher) && replay.haptic.is_open());
+        let damaged = StateRecord { checksum: state.checksum + 1, ..state };
+        assert!(begin(&damaged, &mut replay).unwrap_err().contains("damaged"));
         assert!(bone(&watcher) == bone(&trainee) && watcher.haptic.is_open());
         assert_eq!(wound(&watcher), wound(&trainee));
         assert!(wound(&watcher).2.stains.iter().any(|stain| *stain > 0));
@@ -314,7 +341,7 @@ mod tests {
     #[test]
     fn where_nothing_has_happened_nothing_changes_and_what_does_not_fit_is_refused() {
         let (trainee, mut watcher, tick) = (stages(), stages(), TickRecord::default());
-        assert_eq!(joined("same", &trainee, &mut watcher), None);
+        assert_eq!(joined("same", &trainee, &mut watcher), Ok(None));
         let kind = kind_of(watcher.haptic.bone().map(|bone| &**bone));
         for (words, checksum, why) in [
             (vec![kind, 1], Some(0), "damaged; start watching again"),
@@ -326,7 +353,7 @@ mod tests {
             assert!(restore(&state, &tick, &mut watcher).unwrap_err().contains(why));
         }
         assert!(bone(&watcher) == bone(&trainee) && wound(&watcher) == wound(&trainee));
-        let unseen = join("nobody-there", &mut watcher, &Stop::default()).unwrap();
+        let unseen = join("nobody-there", &mut watcher, &Stop::default()).unwrap_err();
         assert!(unseen.contains("no state arrives; run the same version"), "{unseen}");
     }
 }

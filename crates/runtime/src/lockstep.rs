@@ -19,6 +19,7 @@
 
 use crate::clock::Clock;
 use crate::film::{Filming, Shot};
+use crate::joining;
 use crate::journal::{Journal, JournalSenders, journal};
 use crate::{Cells, Numbered, Outcome, RenderInputs, Replayed, Run, SolverOutcome, Stages, Ticks, Times, Tissue, View};
 use std::collections::VecDeque;
@@ -53,7 +54,8 @@ pub fn run(
     film: Option<Filming>,
     picture: impl FnOnce(RenderInputs),
 ) -> Outcome {
-    let Run { stages, start, recorder, share, stop, .. } = run;
+    let Run { stages, start, mut recorder, share, stop, .. } = run;
+    let copied = recording.state.as_ref().map_or(Ok(()), |state| recorder.state(state));
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
     let (senders, receivers) = journal(stages.haptic.force_scale());
@@ -92,7 +94,8 @@ pub fn run(
         });
         picture(inputs);
         let outcome = replaying.join().unwrap_or_default();
-        Outcome { written: writing.join().unwrap_or_default(), ..outcome }
+        let remarks = outcome.remarks.iter().cloned().chain(copied.err().map(|fault| fault.to_string())).collect();
+        Outcome { written: writing.join().unwrap_or_default(), remarks, ..outcome }
     })
 }
 
@@ -126,6 +129,8 @@ struct Replay<'a> {
     collision_times: Times,
     replayed: Replayed,
     last: Option<TickRecord>,
+    /// Why it could not begin as the session did.
+    remark: Option<String>,
     /// Solver records of the recording, by step.
     recorded: &'a [SolverRecord],
     /// Whether steps are matched by time, because this solver's differ from the recorded ones.
@@ -133,8 +138,10 @@ struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    fn new(stages: Stages, recording: &'a Recording, senders: JournalSenders, start: ToolSample) -> Self {
+    fn new(mut stages: Stages, recording: &'a Recording, senders: JournalSenders, start: ToolSample) -> Self {
+        let begins = recording.state.as_ref().map_or(Ok(()), |state| joining::begin(state, &mut stages));
         Self {
+            remark: begins.err().map(|why| format!("the recording began within another session: {why}")),
             recorded: &recording.solver,
             by_time: false,
             haptic: stages.haptic,
@@ -300,13 +307,15 @@ impl<'a> Replay<'a> {
             real_time_factor: last.map_or(0.0, |t| tissue.solver.time_ms() / t.time_ms.max(1e-3)),
             ..SolverOutcome::of(&tissue.solver)
         });
+        let whole = Outcome::of(&self.haptic, self.second.as_ref());
         Outcome {
+            remarks: whole.remarks.iter().cloned().chain(self.remark).collect(),
             ticks: self.ticks,
             seconds: last.map_or(0.0, |tick| tick.time_ms * 1e-3),
             solver,
             end_force_n: last.map_or(0.0, |tick| tick.wrench.force.length()),
             replayed: Some(self.replayed),
-            ..Outcome::of(&self.haptic, self.second.as_ref())
+            ..whole
         }
     }
 }

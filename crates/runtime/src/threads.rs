@@ -155,8 +155,10 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
 /// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
 /// on the calling thread.
 pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
-    let Run { mut stages, start, recorder, mut share, watching, scene, stop } = run;
-    let joined = watching.and_then(|watching| joining::join(&watching.name, &mut stages, stop));
+    let Run { mut stages, start, mut recorder, mut share, watching, scene, stop } = run;
+    let joined = watching.map_or(Ok(None), |watching| joining::join(&watching.name, &mut stages, stop));
+    let mut written = |state: Option<_>| state.map_or(Ok(()), |state| recorder.state(&state));
+    let joined = joined.and_then(|state| written(state).map_err(|fault| fault.to_string())).err();
     joined.iter().for_each(|text| tracing::warn!("{text}"));
     let clock = Clock::start();
     let mut cells = Cells::new(&stages, start);

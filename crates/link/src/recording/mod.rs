@@ -22,7 +22,7 @@ pub use stream::{Streamed, stream};
 
 use crate::LinkError;
 use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME, LOSSES_KEY, REPAIR_NAME};
-use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, StateRecord, TickRecord};
 use scan::{Cursor, Topic};
 use std::collections::HashMap;
 use std::path::Path;
@@ -42,6 +42,8 @@ pub struct Recording {
     pub solver: Vec<SolverRecord>,
     /// Events.
     pub events: Vec<EventRecord>,
+    /// What the session began with, if it joined another; `None` for one that began at rest.
+    pub state: Option<StateRecord>,
     /// Damage of the file; the records are those before it. `None` for a complete file.
     pub damage: Option<Damage>,
     /// Losses before the file was repaired; `None` if it never was.

@@ -5,7 +5,7 @@
 
 use super::Recording;
 use crate::protobuf::{Fields, decode};
-use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, StateRecord, TickRecord};
 
 /// The unread bytes.
 #[derive(Clone, Copy)]
@@ -27,6 +27,7 @@ pub(super) enum Topic {
     Collision,
     Solver,
     Event,
+    State,
     /// Not used by a session.
     #[default]
     Other,
@@ -40,6 +41,7 @@ impl Topic {
             CollisionRecord::NAME => Self::Collision,
             SolverRecord::NAME => Self::Solver,
             EventRecord::NAME => Self::Event,
+            StateRecord::NAME => Self::State,
             _ => Self::Other,
         }
     }
@@ -55,6 +57,7 @@ impl Topic {
             Self::Collision => recording.collisions.push(decode(message)?),
             Self::Solver => recording.solver.push(decode(message)?),
             Self::Event => recording.events.push(decode(message)?),
+            Self::State => recording.state = Some(decode(message)?),
             Self::Other => {}
         }
         Some(())
