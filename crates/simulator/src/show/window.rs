@@ -16,6 +16,7 @@ use trepan_geometry::{Buttons, Pose, ToolKind, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_haptics::spacemouse::{self, SpaceMouse};
 use trepan_link::wire::TeacherRecord;
+use trepan_measurements::bleeding;
 use trepan_patient::progress::Progress;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 use trepan_report::page::Shot;
@@ -111,6 +112,9 @@ impl ViewState {
         let Bleeding { bled_ml, rate_ml_per_min, .. } = brain.wound.bleeding;
         if bled_ml > 0.0 {
             panel.task.push(("blood lost".into(), format!("{bled_ml:.1} ml, {rate_ml_per_min:.1} ml/min")));
+        }
+        if rate_ml_per_min >= bleeding::VESSEL_RATE.f32() {
+            panel.warnings.push("the wound bleeds fast: suck it dry, and coagulate where it comes from".into());
         }
         let dura = &brain.wound.dura;
         if !dura.triangles.is_empty() {

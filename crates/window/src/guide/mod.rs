@@ -12,8 +12,8 @@
 //!                     depth in a hole; a craniotome keeps its foot under the bone. A cutting tool
 //!                     is slower than the pointer: it follows the way, not the chord
 //!   the feed ends     a craniotome's foot rides FOOT_MM below the inner table; others stop
-//!                     where it touches the brain, a tool for the brain PRESS_MM deeper. Where no
-//!                     brain is known, a ball stops at the inner table
+//!                     where it touches the brain, a tool for the brain PRESS_MM deeper, a scalpel
+//!                     INCISE_MM. Where no brain is known, a ball stops at the inner table
 //! left button up      the tool rises, a craniotome out of its cut
 //! wheel               up or down by WHEEL_MM
 //! ```
@@ -25,7 +25,7 @@
 use crate::pointer::Pointer;
 use crate::surface::Surfaces;
 use glam::{Quat, Vec2, Vec3};
-use trepan_geometry::{Pose, Tool};
+use trepan_geometry::{Pose, Tool, ToolKind};
 use trepan_render::View;
 
 /// Height at which a tool flies over a surface, mm.
@@ -62,6 +62,8 @@ const TABLE_MM: [f32; 4] = [0.0, 6.0, 10.0, 16.0];
 /// Way of a tool for the brain from its first touch on, mm: the deepest press of the scripts. It is
 /// a depth, as a mouse does not feel a force that could stop a hand.
 const PRESS_MM: f32 = 6.0;
+/// The same of a scalpel, mm, numerical: through the dura and no further.
+const INCISE_MM: f32 = 1.2;
 /// Height of a ball's centre over the inner table where the feed ends without a brain, in radii.
 /// The hole is then wider than the second of [`WIDE`].
 const END: f32 = 0.5;
@@ -422,7 +424,7 @@ impl Press {
     /// The lowest height along the shaft to which the hand may feed the tool, mm. `skims`: the tool
     /// slides over a surface, and touches it anew.
     fn lowest(&mut self, around: &Around<'_>, cuts: bool, skims: bool) -> f32 {
-        let Tool { cutting_mm, tip_radius_mm, .. } = around.tool;
+        let Tool { kind, cutting_mm, tip_radius_mm, .. } = around.tool;
         let Pose { translation: tip, rotation, .. } = around.world_from_tool;
         let up = rotation * Vec3::Z;
         let (here, craniotome) = (tip.dot(up), cutting_mm > 0.0);
@@ -431,7 +433,8 @@ impl Press {
             self.touched = Some(here);
         }
         if let Some(touched) = self.touched {
-            return touched - if cuts { 0.0 } else { PRESS_MM };
+            let deep_mm = if kind == ToolKind::Scalpel { INCISE_MM } else { PRESS_MM };
+            return touched - if cuts { 0.0 } else { deep_mm };
         }
         let lowest = if craniotome { -FOOT_MM } else { END * tip_radius_mm };
         match table(around, tip, up) {

@@ -218,6 +218,8 @@ fn a_held_button_ends_every_feed_at_the_inner_table_or_a_set_depth_in_the_brain(
     assert!(burr > -5.3, "a burr at the inner table: {burr}");
     let probe = deepest(Tool::probe(2.0), &slab);
     assert!((probe + 5.0 + PRESS_MM).abs() < 0.2, "the probe's depth of a press: {probe}");
+    let scalpel = deepest(Tool::scalpel(), &slab);
+    assert!((scalpel + 6.5 + INCISE_MM).abs() < 0.2, "through the dura and no further: {scalpel}");
     let spatula = deepest(Tool::spatula(), &no_brain);
     assert!((spatula + 4.5).abs() < 0.3, "nothing to press: {spatula}");
     let nothing = deepest(Tool::probe(2.0), &|_: &Ray| None);
