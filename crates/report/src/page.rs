@@ -236,8 +236,9 @@ pub fn rows(name: &str, file: &impl Serialize) -> Result<Vec<Row>, ReportError> 
 }
 
 /// Endings of names and their units; a longer ending comes before its own endings.
-const UNITS: [(&str, &str); 16] = [
+const UNITS: [(&str, &str); 17] = [
     ("_mm3", "mm³"),
+    ("_mm2", "mm²"),
     ("_ml_per_min", "ml/min"),
     ("_ml", "ml"),
     ("_n_s", "N s"),
@@ -350,8 +351,9 @@ mod tests {
             "hand_force_n.max_step",
             "bleeding.bled_ml",
             "bleeding.rate_ml_per_min",
+            "dura.cut_out_mm2",
         ];
-        assert_eq!(units.map(unit), ["N s", "µs", "mm³", "N", "ml", "ml/min"]);
+        assert_eq!(units.map(unit), ["N s", "µs", "mm³", "N", "ml", "ml/min", "mm²"]);
         assert_eq!(["hand_force_scale", "scores.peak_bone_force_n"].map(unit), ["", "N"]);
         assert_eq!(["scores.idle_s", "scores.tool_changes", "late_ticks"].map(unit), ["s", "", "ticks"]);
         assert_eq!(["fps", "guard.slewed", "second.guard.slewed"].map(unit), ["1/s", "ticks", "ticks"]);
