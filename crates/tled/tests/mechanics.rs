@@ -5,7 +5,7 @@ use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, NeoHookean, SoftSolver, boxes};
-use trepan_tled::{Config, Damping, Tled};
+use trepan_tled::{Config, Damping, FULL, Tled};
 
 const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81e-3);
 
@@ -105,6 +105,38 @@ fn uniaxial_stretch_has_the_stress_of_the_closed_form() {
         assert!((force / (-axial * 100.0) - 1.0).abs() < 5e-3, "{stretch}: {force} N, closed form {}", -axial * 100.0);
         assert!(lateral.abs() < 5e-3 * force.abs(), "{stretch}: {lateral}");
     }
+}
+
+/// A block that swings without damping loses tissue at random, and energy with it.
+///
+/// Elastic energy counts by what is left of each element; a hundredth may be the steps' own.
+#[test]
+fn tissue_that_is_taken_away_gives_the_rest_no_energy() {
+    let body = block([5, 5, 5], Vec3::splat(50.0), |p| p.z < 1.0);
+    let mut tled = Tled::new(&body, &Config { damping: Damping::None, ..Config::default() }).unwrap();
+    for (n, p) in body.mesh.positions.iter().enumerate() {
+        tled.set_node(n as u32, Vec3::new(0.04 * p.z, 0.0, 0.0), Vec3::ZERO);
+    }
+    let energy = |tled: &Tled| -> f64 {
+        let left = |t: usize| f64::from(tled.fills()[t]) / f64::from(FULL);
+        let of = |t| body.shape(t).volume_mm3 * law(&body).energy(deformation(&body, tled.positions(), t)) * left(t);
+        (0..body.mesh.tets.len()).map(of).sum::<f64>() + kinetic_energy(&body, tled.velocities())
+    };
+    let (dt, count, mut random, mut most) = (tled.stable_dt_ms(), body.mesh.tets.len() as u32, 7u32, 0.0f64);
+    let first = energy(&tled);
+    for step in 0..3400 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let tet = (random >> 8) % count;
+        tled.lower_fill(tet, tled.fills()[tet as usize].saturating_sub(u16::MAX / 2));
+        let report = tled.step(&Loads::default(), dt);
+        assert_eq!((report.non_finite, report.limited), (0, 0));
+        if step % 20 == 0 {
+            most = most.max(energy(&tled) / first);
+        }
+    }
+    assert!(most < 1.01, "{most} of the first");
+    let gone = tled.fills().iter().filter(|fill| **fill == 0).count();
+    assert!(gone > 500 && energy(&tled) < 0.2 * first, "{gone} gone, {} left", energy(&tled) / first);
 }
 
 #[test]
