@@ -116,9 +116,9 @@ impl Border {
         }
     }
 
-    /// The current boundary triangles.
+    /// The brain's current boundary triangles, without the dura.
     pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + Clone + '_ {
-        self.triangles.iter().map(|t| t.map(|n| self.places[n as usize]))
+        self.triangles[..self.own].iter().map(|t| t.map(|n| self.places[n as usize]))
     }
 }
 
