@@ -39,8 +39,8 @@ const DEPTHS_MM: [f32; 2] = [0.8, 6.0];
 const REACH_MM: f32 = 7.0;
 /// Pressure of the brain for a way inwards, N/mm³, numerical: it keeps a slack leaf in its place.
 const BELOW: f32 = 2e-3;
-/// Way of the brain below that moves the sheet, mm, numerical.
-const STIRS_MM: f32 = 0.05;
+/// Way of the brain below that moves the sheet, and one that sutures hold, mm, numerical.
+const STIRS_MM: [f32; 2] = [0.05, 0.3];
 /// Cosine up to which a force points inwards rather than aside, numerical.
 const INWARDS: f32 = 0.7;
 /// Change of the force where another triangle is met, N, from which on it is faded in, numerical.
@@ -102,8 +102,8 @@ pub struct Dura {
     left_ms: f64,
     awake_ms: f64,
     touched: bool,
-    /// The triangle that the tool met last, and its force there, N.
-    met: (Option<u32>, Vec3),
+    /// The triangle that the tool met last, its force there, N, and the changes until then.
+    met: (Option<u32>, Vec3, u32),
     /// The force when the triangle changed, N, and its share, which fades.
     held: (Vec3, f32),
     force: Vec3,
@@ -145,7 +145,7 @@ impl Dura {
             left_ms: 0.0,
             awake_ms: f64::NEG_INFINITY,
             touched: false,
-            met: (None, Vec3::ZERO),
+            met: (None, Vec3::ZERO, 0),
             held: (Vec3::ZERO, 0.0),
             force: Vec3::ZERO,
             held_ms: None,
@@ -258,22 +258,20 @@ impl Dura {
 
     /// Lets the sheet rest on the brain as it is now, by the places of its nodes, world mm.
     ///
-    /// Once sutures hold it, or without all of the nodes, nothing changes.
+    /// Without all of the nodes nothing changes.
     pub fn rest_on(&mut self, brain: &[Vec3]) {
-        if self.held_ms.is_some() {
-            return;
-        }
+        let stirs_mm = STIRS_MM[usize::from(self.held_ms.is_some())];
         let mut most_mm = 0.0f32;
         for node in &mut self.sheet.nodes {
             let risen = node.foot.and_then(|foot| foot.risen_mm(brain, self.outward));
             if let Some(risen_mm) = risen {
                 most_mm = most_mm.max((risen_mm - node.risen_mm).abs());
-                if (risen_mm - node.risen_mm).abs() > STIRS_MM {
+                if (risen_mm - node.risen_mm).abs() > stirs_mm {
                     node.risen_mm = risen_mm;
                 }
             }
         }
-        if most_mm > STIRS_MM {
+        if most_mm > stirs_mm {
             self.awake_ms = self.awake_ms.max(self.now_ms + AWAKE_MS);
         }
     }
@@ -369,10 +367,12 @@ impl Dura {
     /// Takes the force of a touch so that the hand feels no jump where another triangle is met.
     fn feel(&mut self, triangle: Option<u32>, now: Vec3, passed_ms: f64) {
         let now = if triangle.is_some() { now } else { Vec3::ZERO };
-        if triangle != self.met.0 && self.force.distance(now) > JUMP_N {
+        // A cut turns the sheet under the blade.
+        let is_other = (triangle, self.changes) != (self.met.0, self.met.2);
+        if is_other && self.force.distance(now) > JUMP_N {
             self.held = (self.force, 1.0);
         }
-        self.met = (triangle, now);
+        self.met = (triangle, now, self.changes);
         self.held.1 *= (-passed_ms / EASES_MS).exp() as f32;
         self.force = now.lerp(self.held.0, self.held.1);
     }
