@@ -41,8 +41,6 @@ const REACH_MM: f32 = 7.0;
 const BELOW: f32 = 2e-3;
 /// Way of the brain below that moves the sheet, and one that sutures hold, mm, numerical.
 const STIRS_MM: [f32; 2] = [0.05, 0.3];
-/// Cosine up to which a force points inwards rather than aside, numerical.
-const INWARDS: f32 = 0.7;
 /// Change of the force where another triangle is met, N, from which on it is faded in, numerical.
 const JUMP_N: f32 = 0.02;
 /// Time over which it is faded in, ms, numerical.
@@ -229,11 +227,6 @@ impl Dura {
     /// Whether it moved in the last step.
     pub fn moves(&self) -> bool {
         self.now_ms <= self.awake_ms
-    }
-
-    /// Whether the tool pressed it inwards in the last step.
-    pub fn is_pressed(&self) -> bool {
-        self.touched && self.force.dot(self.outward) > INWARDS * self.force.length()
     }
 
     /// Force on the tool in the last step, N.

@@ -78,7 +78,7 @@ impl Membrane {
 
     /// Whether it lies between the tool and the tissue.
     pub fn covers(&self) -> bool {
-        !self.is_open() || self.dura.is_pressed()
+        !self.is_open()
     }
 
     /// Goes on to the tool's time, adds the force on the tool to the patch, and keeps account.
