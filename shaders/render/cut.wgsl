@@ -22,6 +22,7 @@ struct SurfacePoint {
 }
 
 @fragment fn fragment(v: Vertex) -> SurfacePoint {
-    let hit = vec4f(fold(scene.brain_cut.xyz), 1.0, distance(v.place, scene.eye.xyz));
-    return SurfacePoint(packed(hit), packed(vec4f(v.rest, 0.0)));
+    var hit = packed(vec4f(fold(scene.brain_cut.xyz), 0.0, distance(v.place, scene.eye.xyz)));
+    hit.z = pack4x8snorm(vec4f(0.0, 0.0, 0.0, 1.0));
+    return SurfacePoint(hit, packed(vec4f(v.rest, 0.0)));
 }

@@ -42,10 +42,21 @@ fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
 fn brain_colour(rest: vec3f) -> vec3f {
     let at = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
     let signal = textureSampleLevel(mri, linear, at, 0.0);
-    let flesh = vec3f(0.90, 0.50, 0.45);
+    let flesh = vec3f(0.90, 0.53, 0.45);
     if scene.eye.w == 0.0 { return flesh * 0.85; }
     return tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal);
 }
+
+// Vessels of the pia over a colour, by the ways to them, of 2 mm: veins keep to the sulci, arteries
+// and their branches cross the gyri.
+fn vessels_over(colour: vec3f, ways: vec3f, in_sulcus: f32) -> vec3f {
+    let line = 1.0 - smoothstep(vec3f(0.30, 0.10, 0.03), vec3f(0.45, 0.20, 0.08), abs(ways));
+    let fine = mix(colour, vec3f(0.66, 0.20, 0.17), 0.30 * line.z);
+    let red = mix(fine, vec3f(0.58, 0.09, 0.08), 0.6 * line.y);
+    return mix(red, vec3f(0.27, 0.07, 0.13), 0.85 * line.x * in_sulcus);
+}
+
+const BELOW_MM = 2.0;    // below the surface, where the grey matter is
 
 // The MRI on the cut brain, as grey as in the slices.
 fn cut_colour(rest: vec3f) -> vec3f {
@@ -112,22 +123,25 @@ fn stained(colour: vec3f, stain: f32) -> vec4f {
     return vec4f(mix(burnt, vec3f(0.36, 0.02, 0.02), film), film);
 }
 
-fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, at_rest: vec4f) -> vec3f {
+fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, look: vec4f, at_rest: vec4f) -> vec3f {
     let rest = at_rest.xyz;
     let normal = unfold(brain.xy);
     var key = past_tools(point);
-    if brain.z > 0.5 { return painted_brain(cut_colour(rest), rest) * (0.6 + 0.4 * key); }
+    if look.w > 0.75 { return painted_brain(cut_colour(rest), rest) * (0.6 + 0.4 * key); }
     let g = grid_of(point);
-    var open = 1.0;
+    var open = min(2.0 * look.w, 1.0);
+    key *= open;
     if scene.forward.w > 0.0 {
-        open = openness(g, normal);
+        open *= openness(g, normal);
         key *= select(1.0, 0.25, shadowed(g, normal, lift()));
     }
     if at_rest.w < -1.5 {
         return lit(dura_colour(rest), select(normal, -normal, dot(normal, along) > 0.0), along, open, key, 0.25);
     }
-    let colour = stained(painted_brain(brain_colour(rest - 3.5 * normal), rest), at_rest.w);
-    return lit(colour.xyz, normal, along, open, key, 0.20 + 0.3 * colour.w);
+    let in_sulcus = 1.0 - smoothstep(0.65, 0.95, 2.0 * look.w);
+    let flesh = vessels_over(brain_colour(rest - BELOW_MM * normal), look.xyz, in_sulcus);
+    let colour = stained(painted_brain(flesh, rest), at_rest.w);
+    return lit(colour.xyz, normal, along, open, key, 0.35 + 0.15 * colour.w);
 }
 
 fn burr_colour(point: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
@@ -160,11 +174,13 @@ fn seen(at: vec2u) -> vec3f {
     let pixel = vec2f(at) + 0.5;
     let along = ray_of(pixel);
     let skull = unpacked(textureLoad(skull_hit, at, 0));
-    var brain = unpacked(textureLoad(brain_hit, at, 0));
+    let met = textureLoad(brain_hit, at, 0);
+    var brain = unpacked(met);
+    let look = unpack4x8snorm(met.z);
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
     // Where one plane cuts both, the depths are equal: bone is shown, even if the mesh reaches into
     // it.
-    if brain.z > 0.5 && on_cut(scene.eye.xyz + skull.w * along) { brain.w = NOTHING; }
+    if look.w > 0.75 && on_cut(scene.eye.xyz + skull.w * along) { brain.w = NOTHING; }
     let first = reach(along, scene.tip, scene.tail);
     let second = reach(along, scene.second_tip, scene.second_tail);
     let near = vec2f(min(first.x, min(first.y, first.z)), min(second.x, min(second.y, second.z)));
@@ -178,7 +194,7 @@ fn seen(at: vec2u) -> vec3f {
     } else if t == near.y {
         colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, scene.tips.y);
     } else if t == brain.w {
-        colour = shade_brain(point, along, brain, unpacked(textureLoad(brain_rest, at, 0)));
+        colour = shade_brain(point, along, brain, look, unpacked(textureLoad(brain_rest, at, 0)));
     } else {
         colour = shade_bone(point, along, skull);
     }

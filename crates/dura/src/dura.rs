@@ -254,19 +254,17 @@ impl Dura {
     /// Without all of the nodes nothing changes.
     pub fn rest_on(&mut self, brain: &[Vec3]) {
         let stirs_mm = STIRS_MM[usize::from(self.held_ms.is_some())];
-        let mut most_mm = 0.0f32;
+        let outward = self.outward;
+        let rises = |node: &Node| node.foot.filter(|_| !node.pinned).and_then(|foot| foot.risen_mm(brain, outward));
+        let stirs = |node: &Node| rises(node).is_some_and(|mm| (mm - node.risen_mm).abs() > stirs_mm);
+        if !self.sheet.nodes.iter().any(stirs) {
+            return;
+        }
+        // All at once: one after the other would keep it awake all the time.
         for node in &mut self.sheet.nodes {
-            let risen = node.foot.and_then(|foot| foot.risen_mm(brain, self.outward));
-            if let Some(risen_mm) = risen {
-                most_mm = most_mm.max((risen_mm - node.risen_mm).abs());
-                if (risen_mm - node.risen_mm).abs() > stirs_mm {
-                    node.risen_mm = risen_mm;
-                }
-            }
+            node.risen_mm = rises(node).unwrap_or(node.risen_mm);
         }
-        if most_mm > stirs_mm {
-            self.awake_ms = self.awake_ms.max(self.now_ms + AWAKE_MS);
-        }
+        self.awake_ms = self.awake_ms.max(self.now_ms + AWAKE_MS);
     }
 
     /// Draws the leaves of the incisions outwards from now on and holds them, as sutures do.

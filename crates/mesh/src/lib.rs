@@ -33,6 +33,7 @@ mod file;
 mod isosurface;
 pub mod lattice;
 pub mod materials;
+mod nets;
 mod quality;
 mod surface;
 mod tets;
@@ -46,6 +47,7 @@ pub use file::{
     write_surface,
 };
 pub use isosurface::isosurface;
+pub use nets::surface_nets;
 pub use quality::Quality;
 pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};

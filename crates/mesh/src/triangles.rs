@@ -61,7 +61,7 @@ impl TriMesh {
         welded
     }
 
-    fn numbered(&mut self, old: u32, position: Vec3, new_index: &mut [u32]) -> u32 {
+    pub(crate) fn numbered(&mut self, old: u32, position: Vec3, new_index: &mut [u32]) -> u32 {
         let slot = &mut new_index[old as usize];
         if *slot == u32::MAX {
             *slot = self.positions.len() as u32;

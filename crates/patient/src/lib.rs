@@ -17,6 +17,7 @@
 mod anatomy;
 pub mod anchors;
 pub mod cache;
+pub mod cortex;
 mod error;
 pub mod fineness;
 mod fit;
@@ -38,6 +39,7 @@ pub mod tissue_class;
 
 pub use anatomy::scanned;
 pub use cache::Cache;
+pub use cortex::Cortex;
 pub use error::PatientError;
 pub use fineness::Fineness;
 pub use import::open as open_case;

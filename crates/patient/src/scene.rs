@@ -4,7 +4,7 @@ use crate::PatientError;
 use crate::mixture::{self, Shares};
 use crate::opening::{bare_brain, bone_of};
 use crate::tissue_class::TissueClass;
-use crate::{Brain, Case};
+use crate::{Brain, Case, Cortex};
 use glam::{DAffine3, DVec3, IVec3};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
@@ -93,6 +93,11 @@ impl Scene {
 }
 
 impl RestBrain {
+    /// The cortex as the MRI shows it; 30 ns for each voxel around the brain.
+    pub fn cortex(&self) -> Cortex {
+        Cortex::of(&self.mri, &self.classes, &self.field)
+    }
+
     /// The body of the brain, of materials by tissue class, in their order, with a membrane of a
     /// shear stiffness on its surface, N/mm.
     pub fn body(&self, of_classes: Vec<Material>, membrane: f32, fixed: &[u32], anchors: &[Anchor]) -> Body {

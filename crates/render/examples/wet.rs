@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let numbers: Vec<u32> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
     let size = [numbers.first().copied().unwrap_or(640), numbers.get(1).copied().unwrap_or(480)];
     let mesh = block();
-    let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None };
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None, cortex: None };
     let stains: Vec<u8> = (0..mesh.positions.len()).map(|node| (node % 250) as u8).collect();
     let dry = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(0.7, 0.6, 0.9), 250.0));
     let wet = Frame { brain_stains: Some(&stains), ..dry };

@@ -1,11 +1,12 @@
 //! The inputs of a picture: the constant scene and the changing frame.
 
+use crate::tool::ends;
 use crate::{Camera, Cut, Overlay, Paint, Stereo};
 use glam::{IVec3, Vec3};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Tool};
-use trepan_mesh::TetMesh;
+use trepan_mesh::{TetMesh, TriMesh};
 use trepan_volume::VoxelVolume;
 
 /// The scene data that stays constant during a session.
@@ -15,10 +16,21 @@ pub struct SceneData<'a> {
     pub bone: Option<Arc<BoneVolume>>,
     /// The brain at rest.
     pub brain: Option<&'a TetMesh>,
+    /// What is seen of it, in place of the tetrahedra's boundary.
+    pub cortex: Option<Cortex<'a>>,
     /// The MRI in patient space, any range.
     pub mri: Option<&'a VoxelVolume<f32>>,
     /// A colour over each voxel of the MRI; black for none.
     pub tint: Option<&'a [[u8; 3]]>,
+}
+
+/// A fine surface that the tetrahedra move.
+#[derive(Clone, Copy, Debug)]
+pub struct Cortex<'a> {
+    /// Triangles at rest, world mm, counterclockwise from outside.
+    pub surface: &'a TriMesh,
+    /// How deep in a sulcus each vertex lies, mm: it is darker there. Vertices beyond lie in none.
+    pub depth_mm: &'a [f32],
 }
 
 /// Box that the slices show, world mm: the voxel centres of the CT, else of the MRI, else the
@@ -127,6 +139,13 @@ impl SliceLook {
 }
 
 impl Frame<'_> {
+    /// The tips of the tools: middle, world mm, and radius, mm.
+    pub(crate) fn balls(&self) -> Vec<(Vec3, f32)> {
+        let first = self.tool.map(|tool| (tool, self.world_from_tool));
+        let balls = first.into_iter().chain(self.second);
+        balls.map(|(tool, pose)| (ends(&tool, &pose)[0].truncate(), tool.tip_radius_mm)).collect()
+    }
+
     /// Intersection of the slices: the chosen point, else the tool's tip, or the camera's target if
     /// the tip is outside the volumes' box.
     pub fn focus(&self, bounds: Aabb) -> Vec3 {

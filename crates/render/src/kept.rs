@@ -21,6 +21,11 @@ pub(crate) struct SceneCache {
 impl SceneCache {
     pub fn of(data: &SceneData) -> Result<Self, RenderError> {
         let mri = data.mri.map(|mri| Signals::of(mri, data.tint)).transpose()?.map(Arc::new);
-        Ok(Self { bone: data.bone.clone(), bounds: bounds(data), brain: data.brain.map(Border::of), mri })
+        Ok(Self {
+            bone: data.bone.clone(),
+            bounds: bounds(data),
+            brain: data.brain.map(|mesh| Border::of(mesh, data.cortex.as_ref())),
+            mri,
+        })
     }
 }

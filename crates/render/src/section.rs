@@ -64,7 +64,7 @@ mod tests {
         #[test]
         fn the_area_of_all_cuts_over_height_is_the_volume(p in prop::array::uniform12(-0.9f32..0.9)) {
             let mesh = TetMesh { positions: p.chunks(3).map(|c| Vec3::new(c[0], c[1], c[2])).collect(), tets: vec![[0, 1, 2, 3]] };
-            let border = Border::of(&mesh);
+            let border = Border::of(&mesh, None);
             let steps = 400;
             let area = |k: usize| -> f32 {
                 let plane = plane(-1.0 + (2 * k + 1) as f32 / steps as f32);
@@ -77,10 +77,10 @@ mod tests {
         #[test]
         fn the_place_at_rest_follows_a_linear_motion(p in prop::array::uniform12(-0.9f32..0.9), height in -0.5f32..0.5) {
             let mesh = TetMesh { positions: p.chunks(3).map(|c| Vec3::new(c[0], c[1], c[2])).collect(), tets: vec![[0, 1, 2, 3]] };
-            let mut border = Border::of(&mesh);
+            let mut border = Border::of(&mesh, None);
             let motion = |v: Vec3| Vec3::new(1.2 * v.x + 0.1 * v.z, v.y - 0.3 * v.x, v.z + 0.2 * v.y) + 0.05;
             let moved: Vec<Vec3> = mesh.positions.iter().map(|&v| motion(v)).collect();
-            border.follow(Some(&moved)).unwrap();
+            border.follow(Some(&moved), &[]).unwrap();
             for corner in triangles(plane(height), &border).flatten() {
                 prop_assert!((motion(corner.rest) - corner.place).length() < 1e-3 && (corner.place.z - height).abs() < 1e-4);
             }

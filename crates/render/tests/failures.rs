@@ -114,7 +114,7 @@ fn sparse_rays_see_a_smooth_surface_where_it_is_and_every_wall() {
 /// Pixels of the brain on the processor and, if available, on the device. They may differ by at
 /// most `most` along the rim.
 fn brain_pixels(gpu: Option<&Gpu>, mesh: &TetMesh, now: &[Vec3], cut: Option<Cut>, most: usize) -> usize {
-    let data = SceneData { bone: None, brain: Some(mesh), mri: None, tint: None };
+    let data = SceneData { bone: None, brain: Some(mesh), mri: None, tint: None, cortex: None };
     let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.31, 1.0, 0.17), 90.0);
     let frame = Frame { brain_positions: Some(now), cut, ..plain(camera) };
     let red = |rgba: &[u8]| rgba.chunks_exact(4).map(|p| p[0] > p[1].saturating_add(8)).collect::<Vec<_>>();

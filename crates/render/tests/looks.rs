@@ -136,7 +136,7 @@ fn rms(a: &Image, b: &Image) -> f64 {
 #[test]
 fn pictures_are_the_stored_ones_by_all_that_draw() {
     let (shell, mesh, mri) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let size = [160, 120];
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
     let mut on_device = device().map(|gpu| scene::renderer(&gpu, &data, size));
@@ -161,7 +161,7 @@ fn pictures_are_the_stored_ones_by_all_that_draw() {
 fn every_look_is_the_same_on_device_and_processor() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut on_device = scene::renderer(&gpu, &data, SIZE);
     let mut on_processor = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
     let moved: Vec<Vec3> = mesh.positions.iter().map(|&p| 0.95 * p + Vec3::new(1.0, 2.0, -1.0)).collect();
@@ -218,7 +218,7 @@ fn paint_lies_on_its_part_of_the_bone_follows_its_version_and_is_refused_where_i
 #[test]
 fn a_cut_brain_shows_its_mri_in_the_plane_and_moves_it_with_the_tissue() {
     let (mesh, mri) = (cube(20.0), ball(DVec3::new(6.0, 0.0, 0.0)));
-    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut renderer = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
     let cut = Cut { point: Vec3::ZERO, normal: Vec3::Y, bone: false };
     let frame = Frame { cut: Some(cut), ..plain(Vec3::Y) };
@@ -312,7 +312,7 @@ fn bone_seen_along_a_cut_has_no_hit_over_it() {
 fn bone_and_brain_cut_by_one_plane_do_not_show_through_each_other() {
     let block = bone(48, |p| p.abs().max_element() - 16.25);
     let (mesh, mri) = (cube(12.0), ball(DVec3::ZERO));
-    let data = SceneData { bone: Some(block), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(block), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut processor = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
     let gpu = device();
     let mut on_device = gpu.as_ref().map(|gpu| scene::renderer(gpu, &data, SIZE));

@@ -33,7 +33,7 @@ fn the_brain_is_seen_where_it_is_and_hidden_by_bone() {
     let lid = bone(48, |p| (p - DVec3::new(0.0, 0.0, 18.0)).abs().max_element() - 4.0);
     let mesh = cube(8.0);
     assert!((0..5).all(|t| mesh.volume_mm3(t) > 0.0));
-    let data = SceneData { bone: Some(lid), brain: Some(&mesh), mri: None, tint: None };
+    let data = SceneData { bone: Some(lid), brain: Some(&mesh), mri: None, tint: None, cortex: None };
     let mut renderer = renderer(&gpu, &data, [64, 64]);
     let front = plain(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 120.0));
     let at_rest = picture(&mut renderer, &front);
@@ -105,7 +105,7 @@ fn slices_have_the_patients_right_on_the_left_and_show_density_and_signal() {
             mri.data[at] = 200.0;
         }
     }
-    let data = SceneData { bone: Some(lump), brain: None, mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(lump), brain: None, mri: Some(&mri), tint: None, cortex: None };
     let mut renderer = renderer(&gpu, &data, [200, 150]);
     let tip = Pose::from_translation(Vec3::new(15.0, 15.0, 15.0));
     let frame = Frame { world_from_tool: tip, ..Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0)) };
@@ -133,9 +133,12 @@ fn the_outline_of_the_moved_brain_is_in_the_slices() {
     let Some(gpu) = device() else { return };
     let ball = bone(60, |p| p.length() - 2.0);
     let mesh = cube(12.0);
-    let mut renderer =
-        Renderer::new(&gpu, &SceneData { bone: Some(ball), brain: Some(&mesh), mri: None, tint: None }, [400, 300])
-            .unwrap();
+    let mut renderer = Renderer::new(
+        &gpu,
+        &SceneData { bone: Some(ball), brain: Some(&mesh), mri: None, tint: None, cortex: None },
+        [400, 300],
+    )
+    .unwrap();
     let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0));
     let red = |image: &Image| {
         let [x, y, w, h] = Layout::of(400, 300, true).slices.unwrap()[0];
@@ -164,7 +167,7 @@ fn the_same_frame_gives_the_same_bytes() {
     let Some(gpu) = device() else { return };
     let ball = bone(40, |p| p.length() - 12.0);
     let mesh = cube(9.0);
-    let data = SceneData { bone: Some(ball), brain: Some(&mesh), mri: None, tint: None };
+    let data = SceneData { bone: Some(ball), brain: Some(&mesh), mri: None, tint: None, cortex: None };
     let frame = Frame {
         tool: Some(Tool::burr(3.0)),
         ..Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0), 90.0))
@@ -178,7 +181,7 @@ fn the_same_frame_gives_the_same_bytes() {
 fn a_finished_picture_says_what_the_device_took() {
     let Some(gpu) = device() else { return };
     let ball = bone(40, |p| p.length() - 12.0);
-    let data = SceneData { bone: Some(ball), brain: None, mri: None, tint: None };
+    let data = SceneData { bone: Some(ball), brain: None, mri: None, tint: None, cortex: None };
     let mut renderer = renderer(&gpu, &data, [320, 240]);
     assert_eq!(renderer.took_s(), 0.0);
     picture(&mut renderer, &Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::ONE, 90.0)));
@@ -218,7 +221,7 @@ fn the_mri_moves_with_the_brain_in_the_slices() {
             mri.data[at] = 200.0;
         }
     }
-    let data = SceneData { bone: Some(speck), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(speck), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut renderer = renderer(&gpu, &data, [400, 300]);
     let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0));
     // The middle column of the bright ball in the axial slice of 100 pixels for 59 mm and a margin

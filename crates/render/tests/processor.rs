@@ -51,7 +51,8 @@ fn the_processor_draws_the_devices_picture() {
     let (shell, mesh, mri, frame) = head();
     // Blue on one side of the head.
     let tint: Vec<[u8; 3]> = (0..mri.data.len()).map(|at| [0, 0, if at % 32 < 16 { 255 } else { 0 }]).collect();
-    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: Some(&tint) };
+    let data =
+        SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: Some(&tint), cortex: None };
     let size = [320, 240];
     let mut on_device = scene::renderer(&gpu, &data, size);
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -139,7 +140,7 @@ fn empty_space_skipping_changes_no_hit() {
 #[test]
 fn threads_and_incremental_updates_do_not_change_the_picture() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut one = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
     one.threads = 1;
     one.draw(&frame).expect("drawn");
@@ -157,7 +158,8 @@ fn threads_and_incremental_updates_do_not_change_the_picture() {
 #[test]
 fn a_resected_brain_is_drawn_as_what_is_left_of_it() {
     let (shell, mesh, mri, frame) = head();
-    let scene = |mesh| SceneData { bone: Some(shell.clone()), brain: Some(mesh), mri: Some(&mri), tint: None };
+    let scene =
+        |mesh| SceneData { bone: Some(shell.clone()), brain: Some(mesh), mri: Some(&mri), tint: None, cortex: None };
     let moved: Vec<Vec3> = mesh.positions.iter().map(|&p| 0.9 * p + Vec3::new(2.0, 3.0, -1.0)).collect();
     let cut = Some(Cut { point: Vec3::ZERO, normal: Vec3::X, bone: false });
     let frame = Frame { brain_positions: Some(&moved), show_bone: false, cut, ..frame };
@@ -187,7 +189,7 @@ fn a_resected_brain_is_drawn_as_what_is_left_of_it() {
 #[test]
 fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
     let (shell, mesh, _, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: None, tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: None, tint: None, cortex: None };
     assert_eq!(ProcessorRenderer::new(&data, [0, 4]).unwrap_err(), RenderError::Size(0, 4));
     for size in [[1, 1], [33, 17], [5, 130]] {
         let mut renderer = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -201,7 +203,7 @@ fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
 #[test]
 fn without_a_device_the_processor_draws_and_says_why() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut painter = Painter::on(Err(GpuError::NoAdapter), &data, [120, 100]).expect("the scene loads");
     assert!(painter.notice().is_some_and(|n| n.contains("mesa-vulkan-drivers")), "{:?}", painter.notice());
     assert!(painter.name().contains("processor"));
@@ -216,7 +218,7 @@ fn without_a_device_the_processor_draws_and_says_why() {
 #[test]
 fn with_less_detail_the_view_is_enlarged_and_slices_stay_sharp() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut renderer = ProcessorRenderer::new(&data, [240, 200]).expect("the scene loads");
     renderer.draw(&frame).expect("drawn");
     let (full, layout) = (renderer.image().clone(), renderer.layout());
@@ -235,7 +237,7 @@ fn with_less_detail_the_view_is_enlarged_and_slices_stay_sharp() {
 #[test]
 fn slices_are_drawn_in_turn() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut renderer = ProcessorRenderer::new(&data, [240, 200]).expect("the scene loads");
     renderer.slices_per_frame = 1;
     renderer.draw(&frame).expect("drawn");
@@ -262,7 +264,7 @@ fn slices_are_drawn_in_turn() {
 fn a_lost_device_leaves_the_picture_to_the_processor() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let mut painter = Painter::on(Ok(gpu.clone()), &data, [160, 120]).expect("the scene loads");
     let (before, _) = painter.picture(&frame).expect("drawn");
     assert_eq!(painter.notice(), None);
@@ -281,7 +283,7 @@ fn a_brain_and_its_mri_need_no_ct() {
             mri.data[at] = 200.0;
         }
     }
-    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let size = [400, 300];
     let mut processor = ProcessorRenderer::new(&data, size).expect("a scene without a CT loads");
     let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.5, 1.0, 0.4), 200.0);
@@ -299,7 +301,7 @@ fn a_brain_and_its_mri_need_no_ct() {
         let (ball, brain) = (image.pixel(x + w / 2 + 6, y + h / 2 + 6), image.pixel(x + 3 * w / 4, y + 3 * h / 4));
         assert!(ball[0] > 240 && (15..60).contains(&brain[0]) && brain[0] == brain[2], "{ball:?} and {brain:?}");
     }
-    let alone = SceneData { bone: None, brain: None, mri: None, tint: None };
+    let alone = SceneData { bone: None, brain: None, mri: None, tint: None, cortex: None };
     ProcessorRenderer::new(&alone, size).expect("an empty scene loads").draw(&frame).expect("drawn");
     let Some(gpu) = device() else { return };
     let mut renderer = scene::renderer(&gpu, &data, size);
@@ -324,7 +326,7 @@ fn quartered(image: &Image) -> Image {
 #[test]
 fn edges_at_rest_are_those_of_a_picture_with_sixteen_samples_a_pixel() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let overlay = Overlay {
         force: Some([frame.world_from_tool.translation, Vec3::new(-18.0, 38.0, 12.0)]),
         ..Overlay::default()

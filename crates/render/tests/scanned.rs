@@ -64,7 +64,7 @@ fn a_scanned_ball_is_smooth_on_processor_and_device() {
         let ct = scanned(radius);
         let fine = resample(&ct, &Grid::isotropic_over(&ct, spacing), Interpolation::Cubic, AIR_HU);
         let bone = Arc::new(BoneVolume::new(&fine, ISO).unwrap());
-        let data = SceneData { bone: Some(bone), brain: None, mri: None, tint: None };
+        let data = SceneData { bone: Some(bone), brain: None, mri: None, tint: None, cortex: None };
         let towards_eye = Vec3::new(0.5, 0.7, 0.6);
         let camera = Camera { fov_rad: 0.4, ..Camera::viewed_from(Vec3::ZERO, towards_eye, 5.2 * radius as f32) };
         let frame = Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) };

@@ -70,7 +70,7 @@ mod volume;
 pub use atomic::write_atomically;
 pub use brain::{
     BrainConfidence, BrainConfig, BrainFit, FoundBrain, Hidden, MaskError, StrayBone, brain_by_mri, brain_fit,
-    brain_mask, check_brain_mask, find_brain, leans, stray_bone,
+    brain_mask, check_brain_mask, find_brain, grey_level, leans, stray_bone,
 };
 pub use component::{Components, largest_component};
 pub use distance::{DistanceField, FAR_MM};

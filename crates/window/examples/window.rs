@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ball.data[at] = (400.0 + 300.0 * (40.0 - centre.length())).clamp(-1000.0, 1400.0) as i16;
     }
     let bone = Arc::new(BoneVolume::new(&ball, 400)?);
-    let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
+    let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None };
     let device = if std::env::args().nth(2).is_some_and(|a| a == "processor") {
         Err(GpuError::NoAdapter)
     } else {

@@ -82,7 +82,7 @@ impl Bench {
     pub fn with(panel: Panel) -> Self {
         let bone = VoxelVolume::isotropic([12; 3], Vec3::splat(-5.5), 1.0, 900i16);
         let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
-        let data = SceneData { bone, brain: None, mri: None, tint: None };
+        let data = SceneData { bone, brain: None, mri: None, tint: None, cortex: None };
         let painter = TestPainter(Painter::on(Err(GpuError::NoAdapter), &data, [160, 120]).unwrap(), None);
         let session = TestSession { panel, ..TestSession::default() };
         let shared = Shared { session, renderer: painter, shown: false, fault: None };

@@ -102,7 +102,7 @@ fn ns_per_ray(clock: &Stopwatch) -> f64 {
         ct.data[at] = (400.0 + 250.0 * (4.0 - depth_mm)).clamp(-1000.0, 1400.0) as i16;
     }
     let bone = BoneVolume::new(&ct, 400).expect("the shell is bone");
-    let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None };
+    let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None, cortex: None };
     let mut processor = ProcessorRenderer::new(&data, [PIXELS; 2]).expect("a picture has pixels");
     processor.threads = 1;
     let us = median_us(clock, PICTURES, |i| {

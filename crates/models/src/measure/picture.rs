@@ -64,7 +64,7 @@ impl View {
     /// If the picture has no pixels or too many.
     pub fn measure(&self, choices: &[Picture], threads: usize) -> Result<Vec<Measurement>, RenderError> {
         let full = self.scene.picture_pixels;
-        let data = SceneData { bone: Some(Arc::clone(&self.bone)), brain: None, mri: None, tint: None };
+        let data = SceneData { bone: Some(Arc::clone(&self.bone)), brain: None, mri: None, tint: None, cortex: None };
         let mut renderer = ProcessorRenderer::new(&data, full)?;
         renderer.threads = threads;
         let distance = 0.5 * self.scene.view_mm as f32 / (0.5 * FOV_RAD).tan();

@@ -6,7 +6,7 @@
 
 use crate::border::Border;
 use crate::scene::Scene;
-use crate::{Leaves, RenderError};
+use crate::{Cortex, Frame, RenderError};
 use glam::{Vec3, Vec4};
 use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 use trepan_mesh::TetMesh;
@@ -24,6 +24,7 @@ struct Device {
     places: Buffer<Vec4>,
     normals: Buffer<Vec4>,
     rest: Buffer<Vec4>,
+    looks: Buffer<Vec4>,
     corners: Buffer<[u32; 3]>,
 }
 
@@ -35,20 +36,21 @@ impl Device {
             places: Buffer::zeroed(gpu, "brain places", nodes)?,
             normals: Buffer::zeroed(gpu, "brain normals", nodes)?,
             rest: Buffer::zeroed(gpu, "brain at rest", nodes)?,
+            looks: Buffer::zeroed(gpu, "brain looks", nodes)?,
             corners: Buffer::zeroed(gpu, "brain corners", triangles)?,
         };
-        let rest: Vec<Vec3> = (0..border.places.len() as u32).map(|n| border.at_rest(n)).collect();
-        device.rest.write(gpu, 0, &wide(&rest));
+        device.rest.write(gpu, 0, &wide(&border.at_rest));
+        device.looks.write(gpu, 0, &border.looks);
         device.corners.write(gpu, 0, &border.triangles);
         Ok(device)
     }
 }
 
 impl Brain {
-    pub fn new(gpu: &Gpu, mesh: &TetMesh) -> Result<Self, RenderError> {
-        let border = Border::of(mesh);
+    pub fn new(gpu: &Gpu, mesh: &TetMesh, cortex: Option<&Cortex>) -> Result<Self, RenderError> {
+        let border = Border::of(mesh, cortex);
         let device = Device::of(gpu, &border)?;
-        let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
+        let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
         let pipeline = Pipeline::new(
             gpu,
             &PipelineSpec {
@@ -64,22 +66,15 @@ impl Brain {
         Ok(Self { border, device, pipeline })
     }
 
-    /// Updates the boundary from the mesh's nodes, or resets it to rest, and the dura over it.
+    /// Updates what is seen of the brain, and the dura over it, from a frame.
     /// Returns whether other triangles are there than before: then the pass is to be bound again.
-    pub fn follow(
-        &mut self,
-        gpu: &Gpu,
-        positions: Option<&[Vec3]>,
-        gone: Option<&[bool]>,
-        stains: Option<&[u8]>,
-        dura: Option<&Leaves>,
-    ) -> Result<bool, RenderError> {
-        let is_other = self.border.leave_out(gone) | self.border.cover(dura)?;
+    pub fn follow(&mut self, gpu: &Gpu, frame: &Frame) -> Result<bool, RenderError> {
+        let is_other = self.border.leave_out(frame.brain_gone) | self.border.cover(frame.dura.as_ref())?;
         if is_other {
             self.device = Device::of(gpu, &self.border)?;
         }
-        self.border.follow(positions)?;
-        self.border.stain(stains);
+        self.border.follow(frame.brain_positions, &frame.balls())?;
+        self.border.stain(frame.brain_stains);
         let places = self.border.places.iter().zip(&self.border.stains).map(|(place, stain)| place.extend(*stain));
         self.device.places.write(gpu, 0, &places.collect::<Vec<_>>());
         self.device.normals.write(gpu, 0, &wide(&self.border.normals));
@@ -89,8 +84,9 @@ impl Brain {
     /// Binds the pass to the frame's uniform.
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
         let d = &self.device;
-        let all = [scene.into(), (&d.places).into(), (&d.normals).into(), (&d.rest).into(), (&d.corners).into()];
-        Ok(self.pipeline.bind(gpu, &all)?)
+        let vertices = [&d.places, &d.normals, &d.rest, &d.looks].map(Into::into);
+        let [places, normals, rest, looks] = vertices;
+        Ok(self.pipeline.bind(gpu, &[scene.into(), places, normals, rest, looks, (&d.corners).into()])?)
     }
 
     /// Draws the boundary triangles.

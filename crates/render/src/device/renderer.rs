@@ -53,7 +53,8 @@ impl Renderer {
     /// Loads a scene for pictures of `size` pixels, width and height.
     pub fn new(gpu: &Gpu, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
         let scene = || Buffer::zeroed(gpu, "scene", 1);
-        let brain = |mesh| -> Result<_, RenderError> { Ok((Brain::new(gpu, mesh)?, Face::new(gpu)?)) };
+        let brain =
+            |mesh| -> Result<_, RenderError> { Ok((Brain::new(gpu, mesh, data.cortex.as_ref())?, Face::new(gpu)?)) };
         let passes = Passes {
             scenes: [scene()?, scene()?],
             skull: Skull::new(gpu, data.bone.clone())?,
@@ -113,13 +114,7 @@ impl Renderer {
     /// Updates the brain and its cut; returns the number of triangles over the limit.
     fn follow_brain(&mut self, frame: &Frame) -> Result<u32, RenderError> {
         let Some((brain, face)) = &mut self.passes.brain else { return Ok(0) };
-        let is_other = brain.follow(
-            &self.gpu,
-            frame.brain_positions,
-            frame.brain_gone,
-            frame.brain_stains,
-            frame.dura.as_ref(),
-        )?;
+        let is_other = brain.follow(&self.gpu, frame)?;
         let left = face.follow(&self.gpu, Cut::plane(frame.cut.as_ref()), &brain.border);
         if is_other {
             self.canvas.rebind(&self.gpu, &self.passes)?;

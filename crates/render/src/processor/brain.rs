@@ -1,25 +1,50 @@
-//! CPU version of `brain.wgsl`: the brain's boundary triangles with smooth normals.
+//! CPU version of `brain.wgsl`: the brain's triangles with smooth normals.
+//!
+//! # Practice
+//! First the nearest triangle at each pixel is found, then what is seen of it, where it is seen: a
+//! cortex has half a million triangles, a picture shows a tenth of them.
 
+use super::rows;
 use crate::border::Border;
 use crate::bricks::NOTHING;
 use crate::camera::View;
 use crate::cut::height;
 use crate::section::{self, Corner};
 use glam::{Vec2, Vec3, Vec4};
+use std::ops::Range;
 
 /// The nearest triangle at every pixel.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fragments {
     width: usize,
     height: usize,
-    nearest: Vec<Fragment>,
+    nearest: Vec<Meeting>,
+    /// Whether the last picture had a brain.
     drawn: bool,
+    /// The brain's vertices in the view.
+    vertices: Vec<Vertex>,
+    /// Triangles of the cut, after those of the brain.
+    cut: Vec<[Corner; 3]>,
+    first_cut: u32,
+    plane: Vec4,
+    eye: Vec3,
 }
+
+/// Which triangle is seen at a pixel, and where on it.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    /// One over its depth, 1/mm; 0 where none is.
+    nearness: f32,
+    triangle: u32,
+    /// Weights of the second and the third corner.
+    weights: [f32; 2],
+}
+
+const NOWHERE: Meeting = Meeting { nearness: 0.0, triangle: 0, weights: [0.0; 2] };
 
 /// The brain at a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fragment {
-    depth: f32,
     /// Distance along the ray, mm, or [`NOTHING`].
     pub t: f32,
     pub normal: Vec3,
@@ -29,57 +54,154 @@ pub(crate) struct Fragment {
     pub cut: bool,
     /// Blood, mm; towards -1 a burn.
     pub stain: f32,
+    /// Light of the surroundings, 0 to 1.
+    pub open: f32,
+    /// Ways to a vein, an artery and a branch, of 2 mm.
+    pub ways: Vec3,
 }
 
 const NONE: Fragment =
-    Fragment { depth: f32::INFINITY, t: NOTHING, normal: Vec3::Z, rest: Vec3::ZERO, cut: false, stain: 0.0 };
+    Fragment { t: NOTHING, normal: Vec3::Z, rest: Vec3::ZERO, cut: false, stain: 0.0, open: 1.0, ways: Vec3::ONE };
+
+/// A vertex in the view.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    /// Place in the picture, pixels from the upper left.
+    at: Vec2,
+    /// One over its depth, 1/mm; 0 where it is not before the eye.
+    nearness: f32,
+}
+
+impl Vertex {
+    /// Projects a point into a view of so many pixels.
+    fn seen(view: &View, size: Vec2, place: Vec3) -> Self {
+        let (at, depth) = view.project(place);
+        let nearness = if depth > View::NEAR_MM { 1.0 / depth } else { 0.0 };
+        Self { at: (Vec2::new(at.x, -at.y) * 0.5 + 0.5) * size, nearness }
+    }
+}
 
 impl Fragments {
     pub fn of(width: usize, height: usize) -> Self {
-        Self { width, height, nearest: vec![NONE; width * height], drawn: false }
+        Self { width, height, nearest: vec![NOWHERE; width * height], ..Self::default() }
     }
 
-    pub fn at(&self, pixel: usize) -> &Fragment {
-        &self.nearest[pixel]
+    /// Distance along the ray at a pixel, mm, or [`NOTHING`].
+    pub fn t(&self, brain: Option<&Border>, pixel: usize) -> f32 {
+        self.at(brain, pixel).t
+    }
+
+    /// What is seen at a pixel of the brain that was drawn last.
+    pub fn at(&self, brain: Option<&Border>, pixel: usize) -> Fragment {
+        let Meeting { nearness, triangle, weights: [v, w] } = self.nearest[pixel];
+        let Some(brain) = brain.filter(|_| nearness > 0.0) else { return NONE };
+        let weights = [1.0 - v - w, v, w];
+        let mean = |of: &[Vec3], corners: [u32; 3]| (0..3).map(|k| weights[k] * of[corners[k] as usize]).sum::<Vec3>();
+        if let Some(at) = triangle.checked_sub(self.first_cut) {
+            let corners = &self.cut[at as usize];
+            let of = |value: fn(&Corner) -> Vec3| (0..3).map(|k| weights[k] * value(&corners[k])).sum::<Vec3>();
+            let t = of(|c| c.place).distance(self.eye);
+            return Fragment { t, normal: self.plane.truncate(), rest: of(|c| c.rest), cut: true, ..NONE };
+        }
+        let corners = brain.triangles[triangle as usize];
+        let look: Vec4 = (0..3).map(|k| weights[k] * brain.looks[corners[k] as usize]).sum();
+        Fragment {
+            t: mean(&brain.places, corners).distance(self.eye),
+            normal: mean(&brain.normals, corners).normalize_or(Vec3::Z),
+            rest: mean(&brain.at_rest, corners),
+            cut: false,
+            stain: (0..3).map(|k| weights[k] * brain.stains[corners[k] as usize]).sum(),
+            open: look.w,
+            ways: look.truncate(),
+        }
     }
 
     /// Redraws the boundary and its cut; `None` clears.
-    pub fn draw(&mut self, border: Option<&Border>, view: &View, brain_cut: Vec4) {
+    pub fn draw(&mut self, border: Option<&Border>, view: &View, brain_cut: Vec4, threads: usize) {
         if std::mem::replace(&mut self.drawn, border.is_some()) {
-            self.nearest.fill(NONE);
+            self.nearest.fill(NOWHERE);
         }
         let Some(border) = border else { return };
-        let vertex = |n: u32| {
-            let place = border.places[n as usize];
-            let (normal, stain) = (border.normals[n as usize], border.stains[n as usize]);
-            Vertex { normal, stain, rest: border.at_rest(n), ..Vertex::seen(view, place) }
-        };
-        let vertices: Vec<Vertex> = (0..border.places.len() as u32).map(vertex).collect();
-        for corners in &border.triangles {
-            self.triangle(corners.map(|n| &vertices[n as usize]), view.eye, Some(brain_cut));
-        }
+        (self.plane, self.eye, self.first_cut) = (brain_cut, view.eye, border.triangles.len() as u32);
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        self.vertices.resize(border.places.len(), Vertex { at: Vec2::ZERO, nearness: 0.0 });
+        let many = border.places.len().div_ceil(threads.max(1)).max(1);
+        rows::share(threads, self.vertices.chunks_mut(many).enumerate(), |n, chunk| {
+            let places = &border.places[n * many..];
+            chunk.iter_mut().zip(places).for_each(|(vertex, place)| *vertex = Vertex::seen(view, size, *place));
+        });
+        self.cut.clear();
         if brain_cut != Vec4::ZERO {
-            let corner =
-                |c: Corner| Vertex { normal: brain_cut.truncate(), rest: c.rest, ..Vertex::seen(view, c.place) };
-            for corners in section::triangles(brain_cut, border) {
-                let corners = corners.map(corner);
-                self.triangle(corners.each_ref(), view.eye, None);
-            }
+            self.cut.extend(section::triangles(brain_cut, border));
         }
+        let (vertices, cut) = (&self.vertices, &self.cut);
+        let ends = bands(vertices, self.height, threads);
+        let mut nearest = &mut self.nearest[..];
+        let parts = ends.windows(2).map(|ends| {
+            let (part, rest) = std::mem::take(&mut nearest).split_at_mut(self.width * (ends[1] - ends[0]));
+            nearest = rest;
+            (ends[0], part)
+        });
+        let parts: Vec<(usize, &mut [Meeting])> = parts.collect();
+        rows::share(threads, parts.into_iter(), |first, part| {
+            let rows = first..first + part.len() / self.width.max(1);
+            let mut band = Band { width: self.width, rows, nearest: part };
+            for (n, corners) in (0u32..).zip(&border.triangles) {
+                let corners = corners.map(|n| n as usize);
+                // What turns its back is hidden by what is before it, unless something is cut away.
+                let one_sided = brain_cut == Vec4::ZERO && border.is_closed_at(n);
+                band.triangle(n, corners.map(|n| &vertices[n]), one_sided, |weights| {
+                    let place = (0..3).map(|k| weights[k] * border.places[corners[k]]).sum();
+                    brain_cut == Vec4::ZERO || height(brain_cut, place) <= 0.0
+                });
+            }
+            for (n, corners) in (self.first_cut..).zip(cut) {
+                let corners = corners.map(|corner| Vertex::seen(view, size, corner.place));
+                band.triangle(n, corners.each_ref(), false, |_| true);
+            }
+        });
     }
+}
 
-    /// Draws a triangle of the boundary, clipped by the plane `under`, or of the cut.
-    fn triangle(&mut self, corners: [&Vertex; 3], eye: Vec3, under: Option<Vec4>) {
-        let [a, b, c] = corners.map(|v| v.at * Vec2::new(self.width as f32, self.height as f32));
+/// Rows at which as many bands begin and end as there are threads, with as many vertices each.
+fn bands(vertices: &[Vertex], height: usize, threads: usize) -> Vec<usize> {
+    const STEP: usize = 64;
+    let mut rows: Vec<f32> = vertices.iter().step_by(STEP).map(|vertex| vertex.at.y).collect();
+    rows.sort_unstable_by(f32::total_cmp);
+    let middle = |n: usize| rows.get(n * rows.len() / threads.max(1)).copied().unwrap_or(0.0);
+    let mut ends: Vec<usize> = (1..threads).map(|n| (middle(n).max(0.0) as usize).min(height)).collect();
+    ends.insert(0, 0);
+    ends.push(height);
+    ends
+}
+
+/// Some rows of the picture.
+struct Band<'a> {
+    width: usize,
+    rows: Range<usize>,
+    nearest: &'a mut [Meeting],
+}
+
+impl Band<'_> {
+    /// Draws a triangle where it is the nearest so far and `is_left`, by the weights of its
+    /// corners.
+    fn triangle(&mut self, number: u32, corners: [&Vertex; 3], one_sided: bool, is_left: impl Fn([f32; 3]) -> bool) {
+        let [a, b, c] = corners.map(|v| v.at);
+        let (top, bottom) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+        if top >= self.rows.end as f32 || bottom < self.rows.start as f32 {
+            return;
+        }
         let double_area = (b - a).perp_dot(c - a);
-        // Skips degenerate triangles and those with a non-finite position.
-        if !corners.iter().all(|v| v.depth > View::NEAR_MM) || double_area == 0.0 || !double_area.is_finite() {
+        // Skips degenerate triangles and those with a non-finite position. Pictures have y
+        // downwards: what faces the eye is clockwise.
+        let is_back = one_sided && double_area > 0.0;
+        if is_back || corners.iter().any(|v| v.nearness <= 0.0) || double_area == 0.0 || !double_area.is_finite() {
             return;
         }
         let low = a.min(b).min(c).floor().max(Vec2::ZERO);
-        let high = a.max(b).max(c).ceil().min(Vec2::new(self.width as f32, self.height as f32));
-        for y in low.y as usize..high.y.max(0.0) as usize {
-            for x in low.x as usize..high.x.max(0.0) as usize {
+        let high = a.max(b).max(c).ceil().min(Vec2::new(self.width as f32, self.rows.end as f32)).max(Vec2::ZERO);
+        for y in (low.y as usize).max(self.rows.start)..high.y as usize {
+            for x in low.x as usize..high.x as usize {
                 let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
                 let flat = [(c - b).perp_dot(p - b), (a - c).perp_dot(p - c), (b - a).perp_dot(p - a)]
                     .map(|w| w / double_area);
@@ -87,43 +209,17 @@ impl Fragments {
                     continue;
                 }
                 // Perspective-correct interpolation: attributes are divided by depth.
-                let over = [0, 1, 2].map(|n| flat[n] / corners[n].depth);
-                let depth = 1.0 / over.iter().sum::<f32>();
-                let fragment = &mut self.nearest[x + self.width * y];
-                if depth >= fragment.depth {
+                let over = [0, 1, 2].map(|n| flat[n] * corners[n].nearness);
+                let nearness = over.iter().sum::<f32>();
+                let nearest = &mut self.nearest[x + self.width * (y - self.rows.start)];
+                if nearness <= nearest.nearness {
                     continue;
                 }
-                let mean =
-                    |value: fn(&Vertex) -> Vec3| (0..3).map(|n| over[n] * depth * value(corners[n])).sum::<Vec3>();
-                let place = mean(|v| v.place);
-                if under.is_none_or(|plane| height(plane, place) <= 0.0) {
-                    let normal = mean(|v| v.normal).normalize_or(Vec3::Z);
-                    let (t, rest) = (place.distance(eye), mean(|v| v.rest));
-                    let stain = (0..3).map(|n| over[n] * depth * corners[n].stain).sum();
-                    *fragment = Fragment { depth, t, normal, rest, cut: under.is_none(), stain };
+                let weights = over.map(|over| over / nearness);
+                if is_left(weights) {
+                    *nearest = Meeting { nearness, triangle: number, weights: [weights[1], weights[2]] };
                 }
             }
         }
-    }
-}
-
-/// A corner of a triangle.
-#[derive(Clone, Copy, Debug)]
-struct Vertex {
-    /// Picture coordinates, 0 to 1 from the upper left.
-    at: Vec2,
-    depth: f32,
-    place: Vec3,
-    normal: Vec3,
-    rest: Vec3,
-    stain: f32,
-}
-
-impl Vertex {
-    /// Projects a point into the view.
-    fn seen(view: &View, place: Vec3) -> Self {
-        let (at, depth) = view.project(place);
-        let at = Vec2::new(at.x, -at.y) * 0.5 + 0.5;
-        Self { at, depth, place, normal: Vec3::ZERO, rest: Vec3::ZERO, stain: 0.0 }
     }
 }

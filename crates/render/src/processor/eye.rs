@@ -58,10 +58,10 @@ impl EyeHits {
     ) -> u32 {
         self.edges = None;
         let pixels_cast = self.cast(inputs, show_bone, view, threads);
-        self.fragments.draw(brain, view, inputs.scene.brain_cut);
-        self.light(inputs, view, threads);
+        self.fragments.draw(brain, view, inputs.scene.brain_cut, threads);
+        self.light(inputs, brain, view, threads);
         let (rays, fragments) = (&self.rays, &self.fragments);
-        let depth = |at: usize| rays[at].t.min(fragments.at(at).t);
+        let depth = |at: usize| rays[at].t.min(fragments.t(brain, at));
         items.iter().for_each(|item| overlay::draw(item, inputs.scene, view, &mut self.pixels, depth));
         pixels_cast
     }
@@ -89,7 +89,7 @@ impl EyeHits {
         threads: usize,
     ) {
         let Some(mut edges) = self.edges.take() else { return };
-        self.fragments.draw(brain, view, inputs.scene.brain_cut);
+        self.fragments.draw(brain, view, inputs.scene.brain_cut, threads);
         let [width, height] = self.size.map(|n| n as usize);
         let (bricks, scene, fragments) = (inputs.bricks, inputs.scene, &self.fragments);
         let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
@@ -97,7 +97,7 @@ impl EyeHits {
         let sample = |pixel: usize| {
             let at = [pixel % width, pixel / width];
             let ray = if cast_bone { cast(bricks, scene, at, 0.0, &[]) } else { Ray::NONE };
-            let brain = fragments.at(pixel);
+            let brain = &fragments.at(brain, pixel);
             let near = tools.map(|tool| overlay::inside(tool, at));
             (light::fragment(inputs, at, near, &ray, brain), ray.t.min(brain.t))
         };
@@ -151,14 +151,14 @@ impl EyeHits {
     }
 
     /// Shades every pixel.
-    fn light(&mut self, inputs: &Inputs, view: &View, threads: usize) {
+    fn light(&mut self, inputs: &Inputs, brain: Option<&Border>, view: &View, threads: usize) {
         let [width, height] = self.size.map(|n| n as usize);
         let (rays, fragments, scene) = (&self.rays, &self.fragments, inputs.scene);
         let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
         let near = |at: [usize; 2]| tools.map(|tool| overlay::inside(tool, at));
         let exact = |[x, y]: [usize; 2], _: &[[u8; 4]]| {
             let at = x + width * y;
-            light::fragment(inputs, [x, y], near([x, y]), &rays[at], fragments.at(at))
+            light::fragment(inputs, [x, y], near([x, y]), &rays[at], &fragments.at(brain, at))
         };
         if !inputs.bricks.casting.sparse {
             return rows::share(threads, rows::of(&mut self.pixels, width, 0..height, 0..width), |y, row| {
@@ -166,7 +166,7 @@ impl EyeHits {
             });
         }
         // Interpolates between colours of smooth, unoccluded bone.
-        let bone = |at: usize| rays[at].t < fragments.at(at).t;
+        let bone = |at: usize| rays[at].t < fragments.t(brain, at);
         rows::sparsely(threads, &mut self.pixels, width, exact, |[x, y], around| {
             let at = x + width * y;
             let (aside, off) = (x % 2, y % 2 * width);

@@ -5,7 +5,7 @@ use super::brain::Fragment;
 use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
 use super::tool::{ToolHit, lit};
-use crate::border::DURA;
+use crate::border::{DURA, wave};
 use crate::bricks::NOTHING;
 use crate::mix::trilinear;
 use crate::mri::Signals;
@@ -88,10 +88,11 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
     if brain.cut {
         return painted(cut_colour(inputs.mri, brain.rest)) * (0.6 + 0.4 * key);
     }
-    let mut open = 1.0;
+    let mut open = brain.open;
+    key *= open;
     if scene.forward.w > 0.0 {
         let g = inputs.bricks.grid_of(point);
-        open = inputs.bricks.openness(g, brain.normal, scene.bone_cut);
+        open *= inputs.bricks.openness(g, brain.normal, scene.bone_cut);
         if inputs.bricks.shadowed(g, Surface { normal: brain.normal, lift: lift(&inputs.bricks.grid) }, scene) {
             key *= 0.25;
         }
@@ -100,15 +101,26 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
         let normal = if brain.normal.dot(along) > 0.0 { -brain.normal } else { brain.normal };
         return lit(scene, dura_colour(brain.rest), normal, along, open, key, 0.25);
     }
-    let colour = painted(brain_colour(inputs.mri, brain.rest - 3.5 * brain.normal));
+    let in_sulcus = 1.0 - smoothstep(0.65, 0.95, brain.open);
+    let flesh = brain_colour(inputs.mri, brain.rest - BELOW_MM * brain.normal);
+    let colour = painted(vessels_over(flesh, brain.ways, in_sulcus));
     let (colour, film) = stained(colour, brain.stain);
-    lit(scene, colour, brain.normal, along, open, key, 0.20 + 0.3 * film)
+    lit(scene, colour, brain.normal, along, open, key, 0.35 + 0.15 * film)
+}
+
+/// Vessels of the pia over a colour, by the ways to them: veins keep to the sulci, arteries and
+/// their branches cross the gyri.
+fn vessels_over(colour: Vec3, ways: Vec3, in_sulcus: f32) -> Vec3 {
+    let line = |low, high, way: f32| 1.0 - smoothstep(low, high, way.abs());
+    let fine = colour.lerp(Vec3::new(0.66, 0.20, 0.17), 0.30 * line(0.03, 0.08, ways.z));
+    let red = fine.lerp(Vec3::new(0.58, 0.09, 0.08), 0.6 * line(0.10, 0.20, ways.y));
+    red.lerp(Vec3::new(0.27, 0.07, 0.13), 0.85 * line(0.30, 0.45, ways.x) * in_sulcus)
 }
 
 /// Colour of the dura: pale, with vessels that branch; by the place at rest, mm.
 fn dura_colour(rest: Vec3) -> Vec3 {
-    let wave = |p: Vec3| (p.x + 1.7 * p.y.sin() + 0.8 * (1.7 * p.z).sin()).sin().abs();
-    let vessel = 1.0 - smoothstep(0.02, 0.10, wave(0.16 * rest).min(wave(0.29 * Vec3::new(rest.y, rest.z, rest.x))));
+    let vessel = 1.0
+        - smoothstep(0.02, 0.10, wave(0.16 * rest).0.abs().min(wave(0.29 * Vec3::new(rest.y, rest.z, rest.x)).0.abs()));
     Vec3::new(0.80, 0.68, 0.62).lerp(Vec3::new(0.55, 0.22, 0.22), 0.7 * vessel)
 }
 
@@ -156,8 +168,11 @@ fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
     Vec3::new(0.80, 0.62, 0.50).lerp(Vec3::new(0.93, 0.89, 0.80), dense)
 }
 
+/// Depth below the surface at which the MRI is sampled, mm, numerical: where grey matter is.
+const BELOW_MM: f32 = 2.0;
+
 fn brain_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
-    let flesh = Vec3::new(0.90, 0.50, 0.45);
+    let flesh = Vec3::new(0.90, 0.53, 0.45);
     mri.map_or(flesh * 0.85, |signals| {
         let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
         tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal)

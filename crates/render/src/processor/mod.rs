@@ -166,7 +166,7 @@ impl ProcessorRenderer {
         if let Some(brain) = &mut self.brain {
             brain.leave_out(frame.brain_gone);
             brain.cover(frame.dura.as_ref())?;
-            brain.follow(frame.brain_positions)?;
+            brain.follow(frame.brain_positions, &frame.balls())?;
             brain.stain(frame.brain_stains);
         }
         let (items, lines_left) = items(&frame.overlay, self.view(frame).eye);

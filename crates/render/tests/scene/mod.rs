@@ -27,7 +27,7 @@ pub fn bone(edge: usize, distance: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
 
 /// A scene with bone only.
 pub fn alone(bone: &Arc<BoneVolume>) -> SceneData<'static> {
-    SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None }
+    SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None }
 }
 
 /// A renderer on the device.

@@ -158,7 +158,7 @@ impl Check {
                 let bone =
                     BoneVolume::new(skull, case.isovalue_hu).map_err(|fault| SessionError::Case(fault.to_string()))?;
                 let bone = Arc::new(bone);
-                let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
+                let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None };
                 let mut painter = Painter::on(gpu, &data, HEAD)?;
                 painter.set_quality(true, 1.0)?;
                 let towards = site.as_ref().map_or(Vec3::Y, eye);

@@ -77,7 +77,7 @@ pub(crate) fn show(
     (stage, loading): (&Stage, &Progress),
 ) -> Result<bool, SessionError> {
     let bone = BoneVolume::new(&skull.hu, skull.isovalue_hu).map_err(|fault| SessionError::Case(fault.to_string()))?;
-    let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None };
+    let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None, cortex: None };
     // A software driver needs seconds to compile its programs.
     let by_processor = device.as_ref().map_or(true, Gpu::is_software);
     let mut painter =

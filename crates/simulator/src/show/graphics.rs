@@ -8,7 +8,8 @@ use std::path::Path;
 use trepan_budget::Picture;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_link::Recording;
-use trepan_render::{Camera, Frame, Painter, RenderError, SceneData, SliceLook};
+use trepan_patient::RestBrain;
+use trepan_render::{Camera, Cortex, Frame, Painter, RenderError, SceneData, SliceLook};
 use trepan_report::page::Shot;
 
 /// Caption of the map of bone.
@@ -45,11 +46,13 @@ impl Graphics {
     pub fn open(setup: &SessionSetup, size: [u32; 2], device: Result<Gpu, GpuError>) -> Result<Self, RenderError> {
         let Picture { sparse, detail } = setup.models.setup.picture;
         let brain = setup.scene.brain.as_ref();
+        let cortex = brain.map(RestBrain::cortex);
         let data = SceneData {
             bone: setup.scene.bone.clone(),
             brain: brain.map(|brain| &brain.mesh),
             mri: brain.map(|brain| &brain.mri),
             tint: brain.and_then(|brain| brain.tint.as_deref()),
+            cortex: cortex.as_ref().map(|seen| Cortex { surface: &seen.surface, depth_mm: &seen.depth_mm }),
         };
         let by_processor = device.as_ref().is_ok_and(Gpu::is_software);
         let painter = if by_processor { Painter::by_processor(&data, size) } else { Painter::on(device, &data, size) };

@@ -47,6 +47,12 @@ impl Levels {
     }
 }
 
+/// Signal halfway between CSF and grey matter in a T1 MRI, by what lies deep in a mask of the brain
+/// on its grid; `None` if that is too little or uniform.
+pub fn grey_level(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>) -> Option<f32> {
+    Levels::within(mri, mask).map(|levels| levels.least)
+}
+
 /// Depth of each voxel under the skin, mm, exact up to the core; negative outside the head.
 pub(super) fn depth_in_head(mri: &VoxelVolume<f32>) -> VoxelVolume<f32> {
     let mut values: Vec<f32> = mri.data.iter().copied().filter(|&v| v > 0.0).collect();

@@ -49,6 +49,7 @@ use border::grown;
 pub use confidence::BrainConfidence;
 use given::Given;
 use glam::{DAffine3, DVec3};
+pub use levels::grey_level;
 use levels::{Levels, depth_in_head, is_core};
 use morphology::{SPARE_MM, closed, core, within};
 

@@ -218,7 +218,7 @@ fn paint(
     mut nodes: Reader<Vec<Vec3>>,
     over: &AtomicBool,
 ) -> (f64, &'static str) {
-    let data = SceneData { bone: Some(bone), brain: Some(mesh), mri: None, tint: None };
+    let data = SceneData { bone: Some(bone), brain: Some(mesh), mri: None, tint: None, cortex: None };
     let mut painter = Painter::open(Prefer::Hardware, &data, SIZE).expect("the scene loads");
     let camera = Camera::viewed_from(mesh.bounds().centre(), Vec3::new(0.5, -1.0, 0.7), 250.0);
     let (mut next, mut pictures) = (Instant::now(), 0.0);

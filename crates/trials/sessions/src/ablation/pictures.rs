@@ -46,6 +46,7 @@ impl Pictures {
                     brain: brain.map(|brain| &brain.mesh),
                     mri: brain.map(|brain| &brain.mri),
                     tint: brain.and_then(|brain| brain.tint.as_deref()),
+                    cortex: None,
                 },
                 SIZE,
             )?),

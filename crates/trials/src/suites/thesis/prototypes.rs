@@ -138,6 +138,7 @@ impl Album {
             brain: brain.map(|brain| &brain.mesh),
             mri: brain.map(|brain| &brain.mri),
             tint: brain.and_then(|brain| brain.tint.as_deref()),
+            cortex: None,
         };
         let painter = self.painter.get_or_insert_with(|| Painter::by_processor(&data, SIZE).expect("the scene loads"));
         let near = Camera::viewed_from(scene.site.entry, -scene.site.inward + 0.35 * Vec3::X, NEAR_MM);
@@ -162,7 +163,7 @@ fn rates(scope: Scope, findings: &mut Findings) {
     let bone = scenes::skull(dims, voxel_mm);
     let centre = bone.bounds().centre();
     let distance_mm = 1.9 * bone.bounds().size().max_element();
-    let data = SceneData { bone: Some(bone), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(bone), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let device = Gpu::open(Prefer::Hardware).ok().filter(|gpu| !gpu.is_software());
     let by = device.as_ref().map_or("the processor, every pixel".into(), Gpu::name);
     let painter = match device {

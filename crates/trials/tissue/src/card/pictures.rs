@@ -34,7 +34,7 @@ pub fn run(gpu: &Gpu, scope: Scope, findings: &mut Findings) {
     let pictures = if software { 3 } else { scope.pick(20, 60) };
     for size in &SIZES[..if software { 1 } else { SIZES.len() }] {
         for both in [false, true] {
-            let mut data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
+            let mut data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None };
             if both {
                 (data.brain, data.mri) = (Some(&mesh), Some(&mri));
             }
@@ -71,7 +71,7 @@ pub fn run(gpu: &Gpu, scope: Scope, findings: &mut Findings) {
             findings.rows.push(found.metric("frame_p50_ms", ms).metric("frames_per_s", 1e3 / ms));
         }
     }
-    let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
+    let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None };
     let Ok(mut renderer) = Renderer::new(gpu, &data, SIZES[0]) else { return };
     let mut draw = |turn: usize| {
         renderer.draw(&shown(turn, false)).expect("drawn");

@@ -189,7 +189,7 @@ fn mesh_map(gpu: Option<&Gpu>) -> Map {
         ..Map::default()
     };
     let cut = Cut { point: Vec3::new(0.3, 4.1, 0.0), normal: Vec3::new(0.2, 1.0, 0.1), bone: false };
-    let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None };
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None, cortex: None };
     let mut drawers = By::of(&data, gpu, SIZE);
     let mut sound = 0;
     for (name, now, [least, most]) in &cases {

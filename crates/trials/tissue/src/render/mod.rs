@@ -3,6 +3,7 @@
 
 pub mod accuracy;
 mod bores;
+mod cortex;
 pub mod faults;
 mod likeness;
 mod models;
@@ -54,7 +55,7 @@ pub const SPARSE: Setting =
 /// Lists the parts: accuracy on small pictures, speed on large ones, models and failures.
 pub fn parts(_: Scope) -> Vec<Part> {
     type Subject = fn(Scope, Option<&Gpu>, &mut Findings);
-    let all: [(&str, Subject); 8] = [
+    let all: [(&str, Subject); 9] = [
         ("depth", accuracy::depth),
         ("walls", |_, gpu, found| accuracy::walls(gpu, found)),
         ("bores", bores::run),
@@ -63,6 +64,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
         ("speed", speed::run),
         ("models", models::run),
         ("rest", |scope, _, found| rest::run(scope, found)),
+        ("cortex", |scope, _, found| cortex::run(scope, found)),
     ];
     // Without a driver only the processor's rows are made.
     let drawn = |(name, subject): (&str, Subject)| {
@@ -74,7 +76,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
 impl By {
     /// The CPU renderer, and the GPU one if there is a device.
     pub fn all(bone: &Arc<BoneVolume>, gpu: Option<&Gpu>, size: [u32; 2]) -> Vec<Self> {
-        Self::of(&SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None }, gpu, size)
+        Self::of(&SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None }, gpu, size)
     }
 
     fn of(data: &SceneData, gpu: Option<&Gpu>, size: [u32; 2]) -> Vec<Self> {

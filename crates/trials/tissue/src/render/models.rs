@@ -22,7 +22,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     let skulls = scope.pick(&SKULLS[..1], &SKULLS[..]);
     for &(name, dims, voxel_mm) in skulls {
         let bone = skull(dims, voxel_mm);
-        let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
+        let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None, cortex: None };
         measure(&format!("{name}, {}x{}x{}", dims[0], dims[1], dims[2]), &data, size, gpu, scope, findings, &[]);
     }
     let (mesh, mri) = brain(scope.pick(4000, 22_000));
@@ -30,7 +30,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     let (_, dims, voxel_mm) = skulls[skulls.len() / 2];
     let bone: Arc<BoneVolume> = skull(dims, voxel_mm);
     let name = format!("brain of {} tetrahedra", mesh.tets.len());
-    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     measure(&name, &data, size, gpu, scope, findings, &sways);
     measure(
         &format!("{name} in its skull"),

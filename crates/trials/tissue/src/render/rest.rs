@@ -24,7 +24,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     let (mesh, mri) = brain(scope.pick(4000, 22_000));
     let sways: Vec<Vec<Vec3>> = (0..4).map(|turn| swaying(&mesh, turn)).collect();
     let bounds = bone.bounds();
-    let data = SceneData { bone: Some(bone), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let data = SceneData { bone: Some(bone), brain: Some(&mesh), mri: Some(&mri), tint: None, cortex: None };
     let entry = bounds.centre() + Vec3::new(20.0, 60.0, 55.0);
     let shaft = Quat::from_rotation_arc(Vec3::Z, Vec3::new(0.4, 0.6, 0.7).normalize());
     let shown = |turn: usize| {

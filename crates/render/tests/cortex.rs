@@ -1,0 +1,89 @@
+//! A fine cortex over coarse tetrahedra: what is seen does not depend on them.
+
+mod scene;
+
+use glam::{DAffine3, DVec3, Vec3};
+use scene::device;
+use trepan_mesh::{TetMesh, TriMesh, lattice, surface_nets};
+use trepan_render::{Camera, Cortex, Frame, Image, ProcessorRenderer, SceneData, SliceLook};
+use trepan_volume::VoxelVolume;
+
+const SIZE: [u32; 2] = [320, 240];
+
+/// How far a place is in tissue, mm: a ball with furrows.
+fn tissue(p: Vec3) -> f32 {
+    let furrow = 3.0 * (0.45 * p.y).sin().abs().powi(8);
+    24.0 - furrow - p.length()
+}
+
+/// The cortex with its depths, and two meshes of the ball without furrows.
+fn brain() -> (TriMesh, Vec<f32>, [TetMesh; 2]) {
+    let mut values = VoxelVolume::filled([56; 3], DAffine3::from_translation(DVec3::splat(-27.5)), 0.0f32);
+    for at in 0..values.data.len() {
+        values.data[at] = tissue(values.centre_of([at % 56, at / 56 % 56, at / 3136]).as_vec3());
+    }
+    let surface = surface_nets(&values, 0.0).largest_part();
+    let depths = surface.positions.iter().map(|p| (24.0 - p.length()).max(0.0)).collect();
+    let mut mask = values.map(|_| 0u8);
+    for at in 0..mask.data.len() {
+        let place = mask.centre_of([at % 56, at / 56 % 56, at / 3136]);
+        mask.data[at] = u8::from(place.length() < 24.0);
+    }
+    let mesh = |target_tets| {
+        lattice::tetrahedra(&mask, &lattice::Config { target_tets, ..Default::default() }).expect("a ball has a mesh")
+    };
+    (surface, depths, [mesh(600), mesh(4000)])
+}
+
+fn frame<'a>() -> Frame<'a> {
+    let slices = SliceLook { half_height_mm: Some(30.0), ..SliceLook::default() };
+    Frame { slices, ..Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.4), 110.0)) }
+}
+
+/// Share of the pixels that differ by more than a tenth of white.
+fn apart(a: &Image, b: &Image) -> f64 {
+    let far = a.rgba.chunks(4).zip(b.rgba.chunks(4)).filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 25)).count();
+    far as f64 / (a.rgba.len() / 4) as f64
+}
+
+#[test]
+fn the_tetrahedra_change_the_motion_and_not_the_look() {
+    let (surface, depth_mm, meshes) = brain();
+    let cortex = Some(Cortex { surface: &surface, depth_mm: &depth_mm });
+    let draw = |mesh: &TetMesh, cortex, squeeze: f32| {
+        let data = SceneData { bone: None, brain: Some(mesh), mri: None, tint: None, cortex };
+        let mut renderer = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
+        let moved: Vec<Vec3> = mesh.positions.iter().map(|p| *p * Vec3::new(1.0, squeeze, 1.0)).collect();
+        renderer.draw(&Frame { brain_positions: Some(&moved), ..frame() }).expect("drawn");
+        renderer.image().clone()
+    };
+    for squeeze in [1.0, 0.8] {
+        let [draft, fine] = meshes.each_ref().map(|mesh| draw(mesh, cortex, squeeze));
+        assert!(apart(&draft, &fine) < 0.002, "{}", apart(&draft, &fine));
+        let [draft, fine] = meshes.each_ref().map(|mesh| draw(mesh, None, squeeze));
+        assert!(apart(&draft, &fine) > 0.005, "without a cortex they do differ");
+    }
+}
+
+#[test]
+fn device_and_processor_draw_the_same_cortex_also_where_tetrahedra_are_gone() {
+    let Some(gpu) = device() else { return };
+    let (surface, depth_mm, [mesh, _]) = brain();
+    let cortex = Some(Cortex { surface: &surface, depth_mm: &depth_mm });
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None, cortex };
+    let mut on_device = scene::renderer(&gpu, &data, SIZE);
+    let mut on_processor = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
+    let middle = |tet: &[u32; 4]| tet.iter().map(|n| mesh.positions[*n as usize]).sum::<Vec3>() / 4.0;
+    let gone: Vec<bool> = mesh.tets.iter().map(|tet| middle(tet).distance(Vec3::new(16.0, 12.0, 6.0)) < 12.0).collect();
+    let mut images = Vec::new();
+    for brain_gone in [None, Some(&gone[..]), None] {
+        let frame = Frame { brain_gone, ..frame() };
+        on_device.draw(&frame).expect("drawn");
+        on_processor.draw(&frame).expect("drawn");
+        let (device, processor) = (on_device.image().expect("picture"), on_processor.image());
+        assert!(apart(&device, processor) < 0.01, "{}", apart(&device, processor));
+        images.push(processor.clone());
+    }
+    assert_eq!(images[0], images[2], "what is back looks as before");
+    assert!(apart(&images[0], &images[1]) > 0.03);
+}
