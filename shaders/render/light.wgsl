@@ -50,7 +50,7 @@ fn brain_colour(rest: vec3f) -> vec3f {
 // Vessels of the pia over a colour, by the ways to them, of 2 mm: veins keep to the sulci, arteries
 // and their branches cross the gyri.
 fn vessels_over(colour: vec3f, ways: vec3f, in_sulcus: f32) -> vec3f {
-    let line = 1.0 - smoothstep(vec3f(0.30, 0.10, 0.03), vec3f(0.45, 0.20, 0.08), abs(ways));
+    let line = 1.0 - smoothstep(vec3f(0.20, 0.10, 0.03), vec3f(0.32, 0.20, 0.08), abs(ways));
     let fine = mix(colour, vec3f(0.66, 0.20, 0.17), 0.30 * line.z);
     let red = mix(fine, vec3f(0.58, 0.09, 0.08), 0.6 * line.y);
     return mix(red, vec3f(0.27, 0.07, 0.13), 0.85 * line.x * in_sulcus);

@@ -89,6 +89,38 @@ impl TriMesh {
         self.triangles.extend(split);
     }
 
+    /// Fewer triangles: the vertices in each cube of an edge, mm, become their mean where their
+    /// normals are within an angle, by its cosine, of one another's mean (Rossignac and Borrel 1993).
+    pub fn clustered(&self, edge_mm: f32, cosine: f32) -> Self {
+        let mut normals = vec![Vec3::ZERO; self.positions.len()];
+        for (t, corners) in self.triangles.iter().enumerate() {
+            let [a, b, c] = self.corners(t);
+            corners.iter().for_each(|n| normals[*n as usize] += (b - a).cross(c - a));
+        }
+        normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
+        let cube = |n: u32| (self.positions[n as usize] / edge_mm).floor().as_ivec3().to_array();
+        let mut order: Vec<([i32; 3], u32)> = (0..self.positions.len() as u32).map(|n| (cube(n), n)).collect();
+        order.sort_unstable();
+        let mut new_index = vec![0u32; self.positions.len()];
+        let mut made = Self::default();
+        for cube in order.chunk_by(|a, b| a.0 == b.0) {
+            let sum = |of: &[Vec3]| cube.iter().map(|(_, n)| of[*n as usize]).sum::<Vec3>();
+            let mean = sum(&normals).normalize_or_zero();
+            let is_flat = cube.iter().all(|(_, n)| normals[*n as usize].dot(mean) > cosine);
+            for (at, (_, n)) in cube.iter().enumerate() {
+                if at == 0 || !is_flat {
+                    let place =
+                        if is_flat { sum(&self.positions) / cube.len() as f32 } else { self.positions[*n as usize] };
+                    made.positions.push(place);
+                }
+                new_index[*n as usize] = made.positions.len() as u32 - 1;
+            }
+        }
+        let moved = self.triangles.iter().map(|corners| corners.map(|n| new_index[n as usize]));
+        made.triangles = moved.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        made
+    }
+
     /// The part with the most triangles among those that share no vertex, such as a cortex without
     /// its ventricles.
     pub fn largest_part(&self) -> Self {
@@ -150,6 +182,15 @@ mod tests {
             let worst = mesh.positions.iter().map(|p| (p.distance(middle) - 9.0).abs()).fold(0.0, f32::max);
             assert!(worst < 0.1, "{worst} mm");
         }
+    }
+
+    #[test]
+    fn clusters_leave_fewer_triangles_on_the_same_ball() {
+        let mesh = surface_nets(&balls(0.8, &[(Vec3::new(21.0, 14.0, 10.0), 9.0)]), 0.0);
+        let fewer = mesh.clustered(3.0, 0.85);
+        assert!(fewer.is_closed() && 3 * fewer.triangles.len() < mesh.triangles.len());
+        assert!((fewer.volume_mm3() / mesh.volume_mm3() - 1.0).abs() < 0.09, "{}", fewer.volume_mm3());
+        assert_eq!(mesh.clustered(3.0, 1.1).triangles.len(), mesh.triangles.len(), "nothing is that flat");
     }
 
     #[test]

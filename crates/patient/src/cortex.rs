@@ -22,6 +22,8 @@ use trepan_volume::{DistanceField, VoxelVolume, grey_level};
 const TISSUE_SHARE: f32 = 0.6;
 /// Width over which the signal rises from CSF to grey matter, mm, numerical: a voxel or two.
 const RISE_MM: f32 = 2.0;
+/// Cosine of the angle between normals up to which vertices are merged, numerical: 30 degrees.
+const FLAT: f32 = 0.866;
 /// Values beyond this are cut off, mm, numerical.
 const REACH_MM: f32 = 1.5;
 
@@ -38,6 +40,7 @@ impl Cortex {
     /// The cortex in an MRI, within a mask on its grid, whose distance field is given.
     pub fn of(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>, field: &DistanceField) -> Self {
         let surface = surface_nets(&into_tissue(mri, mask, field), 0.0).largest_part();
+        let surface = surface.clustered(2.0 * mri.spacing_mm().max_element() as f32, FLAT);
         let depth = |place: &Vec3| (-field.sample(*place)).max(0.0);
         let depth_mm = surface.positions.iter().map(depth).collect();
         Self { surface, depth_mm }

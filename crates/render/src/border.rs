@@ -4,6 +4,8 @@
 //! With a cortex its vertices sit in the tetrahedra and move with them; the faces that a resection
 //! bares are the tetrahedra's. Without one the boundary of what is left is shown.
 
+use crate::chunks::{self, Chunk, MANY};
+use crate::cut::height;
 use crate::frame::Cortex;
 use crate::seats::{NO_TET, Seat, seats};
 use crate::touch::touch;
@@ -25,6 +27,10 @@ pub(crate) struct Border {
     seats: Vec<Seat>,
     /// Triangles over the vertices.
     pub triangles: Vec<[u32; 3]>,
+    /// All triangles in chunks.
+    pub chunks: Vec<Chunk>,
+    /// The longest way of a vertex of the brain from rest, mm.
+    pub moved_mm: f32,
     /// The tetrahedra that are left, over all nodes.
     pub tets: Vec<[u32; 4]>,
     /// Boundary of what is left, over all nodes; empty without a cortex.
@@ -116,7 +122,9 @@ impl Whole {
             let mut open: Vec<f32> = depth_mm.iter().map(open).collect();
             open.resize(fine.positions.len(), 1.0);
             let seats = seats(mesh, &fine.positions);
-            return Self { tets, faces: surface.triangles, seats, triangles: fine.triangles.clone(), open };
+            let mut triangles = fine.triangles.clone();
+            chunks::sort(&mut triangles, &fine.positions);
+            return Self { tets, faces: surface.triangles, seats, triangles, open };
         }
         let (seats, triangles) = on_nodes(&surface.triangles);
         let open = vec![1.0; seats.len()];
@@ -144,6 +152,8 @@ impl Border {
             gone: Vec::new(),
             seats: whole.seats.clone(),
             triangles: whole.triangles.clone(),
+            chunks: Vec::new(),
+            moved_mm: 0.0,
             open: whole.open.clone(),
             looks: Vec::new(),
             faces: whole.faces.clone(),
@@ -178,6 +188,7 @@ impl Border {
             looks.collect_into_vec(&mut self.looks);
         }
         (self.own, self.leaves) = (self.triangles.len(), 0);
+        self.chunks = Chunk::all(&self.triangles, &self.at_rest);
     }
 
     /// Shows the mesh without the tetrahedra that are `gone`, or all of it; returns whether that
@@ -230,6 +241,8 @@ impl Border {
         if is_other {
             self.triangles.truncate(self.own);
             self.triangles.extend(moved);
+            self.chunks.truncate(self.own.div_ceil(MANY));
+            self.chunks.push(Chunk::anywhere(self.own..self.triangles.len()));
             self.leaves = wanted;
             self.at_rest.resize(brain + wanted, Vec3::ZERO);
             self.places.resize(brain + wanted, Vec3::ZERO);
@@ -255,6 +268,9 @@ impl Border {
         self.places.par_iter_mut().zip(&self.seats).for_each(|(place, seat)| *place = seat.place(now));
         touch(&mut self.places[..self.seats.len()], &self.faces, &self.now, balls);
         smooth_normals(&self.places, &self.triangles, &mut self.normals);
+        let ways = self.places[..self.seats.len()].par_iter().zip(&self.at_rest);
+        let moved = ways.map(|(place, rest)| place.distance_squared(*rest)).reduce(|| 0.0, f32::max);
+        self.moved_mm = moved.sqrt();
         Ok(())
     }
 
@@ -279,13 +295,20 @@ impl Border {
     }
 
     /// Whether a triangle is of a surface that closes around the brain.
-    pub fn is_closed_at(&self, triangle: u32) -> bool {
-        !self.faces.is_empty() && (triangle as usize) < self.own
+    pub fn is_closed_at(&self, triangle: usize) -> bool {
+        !self.faces.is_empty() && triangle < self.own
     }
 
-    /// The brain's current boundary triangles, without the dura.
-    pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + Clone + '_ {
-        self.triangles[..self.own].iter().map(|t| t.map(|n| self.places[n as usize]))
+    /// The brain's current triangles that cross a plane, without the dura.
+    pub fn across(&self, plane: Vec4) -> impl Iterator<Item = [Vec3; 3]> + '_ {
+        let own = self.chunks.iter().filter(|chunk| chunk.triangles.end <= self.own);
+        let some = own.filter(move |chunk| chunk.may_cross(plane, self.moved_mm));
+        let corners =
+            some.flat_map(|chunk| &self.triangles[chunk.triangles.clone()]).map(|t| t.map(|n| self.places[n as usize]));
+        corners.filter(move |corners| {
+            let [a, b, c] = corners.map(|place| height(plane, place) >= 0.0);
+            a != b || b != c
+        })
     }
 }
 

@@ -26,6 +26,7 @@ struct Readme;
 mod border;
 mod bricks;
 mod camera;
+mod chunks;
 mod cut;
 mod device;
 mod drilled;

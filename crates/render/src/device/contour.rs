@@ -1,6 +1,7 @@
 //! The outline of the deformed brain in a slice: triangles cut by a plane, drawn as lines.
 
 use crate::RenderError;
+use crate::border::Border;
 use crate::scene::Scene;
 use crate::slice::Plane;
 use glam::{Vec2, Vec3, Vec4};
@@ -42,17 +43,12 @@ impl Contour {
         Ok(Self { pipeline, ends, bindings, counts: [0; 3], lines: Vec::with_capacity(2 * MOST_LINES) })
     }
 
-    /// Cuts the triangles by three planes; returns the number of lines over the limit.
-    pub fn follow(
-        &mut self,
-        gpu: &Gpu,
-        planes: &[Plane; 3],
-        triangles: impl Iterator<Item = [Vec3; 3]> + Clone,
-    ) -> u32 {
+    /// Cuts the brain by three planes; returns the number of lines over the limit.
+    pub fn follow(&mut self, gpu: &Gpu, planes: &[Plane; 3], brain: &Border) -> u32 {
         let mut left = 0;
         for (n, plane) in planes.iter().enumerate() {
             self.lines.clear();
-            for ends in triangles.clone().filter_map(|t| plane.cut(t)) {
+            for ends in brain.across(plane.level()).filter_map(|t| plane.cut(t)) {
                 if self.lines.len() < 2 * MOST_LINES {
                     self.lines.extend(ends);
                 } else {

@@ -173,7 +173,7 @@ impl Renderer {
         let look = frame.slices.with_bone(self.passes.skull.is_some());
         self.passes.slices.follow(&self.gpu, &planes, rectangles, &look);
         let Some((brain, _)) = &self.passes.brain else { return 0 };
-        let contour = self.contour.as_mut().map_or(0, |c| c.follow(&self.gpu, &planes, brain.border.corners()));
+        let contour = self.contour.as_mut().map_or(0, |c| c.follow(&self.gpu, &planes, &brain.border));
         contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))
     }
 

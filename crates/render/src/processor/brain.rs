@@ -8,6 +8,7 @@ use super::rows;
 use crate::border::Border;
 use crate::bricks::NOTHING;
 use crate::camera::View;
+use crate::chunks::Chunk;
 use crate::cut::height;
 use crate::section::{self, Corner};
 use glam::{Vec2, Vec3, Vec4};
@@ -135,6 +136,9 @@ impl Fragments {
             self.cut.extend(section::triangles(brain_cut, border));
         }
         let (vertices, cut) = (&self.vertices, &self.cut);
+        let rows = |chunk| (chunk, Chunk::rows(chunk, view, size, border.moved_mm));
+        let chunks: Vec<(&Chunk, Range<usize>)> =
+            border.chunks.iter().map(rows).filter(|(_, rows)| !rows.is_empty()).collect();
         let ends = bands(vertices, self.height, threads);
         let mut nearest = &mut self.nearest[..];
         let parts = ends.windows(2).map(|ends| {
@@ -146,10 +150,13 @@ impl Fragments {
         rows::share(threads, parts.into_iter(), |first, part| {
             let rows = first..first + part.len() / self.width.max(1);
             let mut band = Band { width: self.width, rows, nearest: part };
-            for (n, corners) in (0u32..).zip(&border.triangles) {
-                let corners = corners.map(|n| n as usize);
+            let Range { start, end } = band.rows;
+            let seen = chunks.iter().filter(|(_, seen)| seen.start < end && start < seen.end);
+            for n in seen.flat_map(|(chunk, _)| chunk.triangles.clone()) {
+                let corners = border.triangles[n].map(|n| n as usize);
                 // What turns its back is hidden by what is before it, unless something is cut away.
                 let one_sided = brain_cut == Vec4::ZERO && border.is_closed_at(n);
+                let n = n as u32;
                 band.triangle(n, corners.map(|n| &vertices[n]), one_sided, |weights| {
                     let place = (0..3).map(|k| weights[k] * border.places[corners[k]]).sum();
                     brain_cut == Vec4::ZERO || height(brain_cut, place) <= 0.0
@@ -187,21 +194,20 @@ impl Band<'_> {
     /// corners.
     fn triangle(&mut self, number: u32, corners: [&Vertex; 3], one_sided: bool, is_left: impl Fn([f32; 3]) -> bool) {
         let [a, b, c] = corners.map(|v| v.at);
-        let (top, bottom) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
-        if top >= self.rows.end as f32 || bottom < self.rows.start as f32 {
-            return;
-        }
         let double_area = (b - a).perp_dot(c - a);
-        // Skips degenerate triangles and those with a non-finite position. Pictures have y
-        // downwards: what faces the eye is clockwise.
-        let is_back = one_sided && double_area > 0.0;
-        if is_back || corners.iter().any(|v| v.nearness <= 0.0) || double_area == 0.0 || !double_area.is_finite() {
+        // Pictures have y downwards: what faces the eye is clockwise. Degenerate triangles and those
+        // with a non-finite position are skipped.
+        if one_sided && double_area > 0.0 || double_area == 0.0 || !double_area.is_finite() {
             return;
         }
-        let low = a.min(b).min(c).floor().max(Vec2::ZERO);
-        let high = a.max(b).max(c).ceil().min(Vec2::new(self.width as f32, self.rows.end as f32)).max(Vec2::ZERO);
-        for y in (low.y as usize).max(self.rows.start)..high.y as usize {
-            for x in low.x as usize..high.x as usize {
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let lines = first(low.y).max(self.rows.start)..past(high.y).min(self.rows.end);
+        let columns = first(low.x)..past(high.x).min(self.width);
+        if lines.is_empty() || columns.is_empty() || corners.iter().any(|v| v.nearness <= 0.0) {
+            return;
+        }
+        for y in lines {
+            for x in columns.clone() {
                 let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
                 let flat = [(c - b).perp_dot(p - b), (a - c).perp_dot(p - c), (b - a).perp_dot(p - a)]
                     .map(|w| w / double_area);
@@ -222,4 +228,15 @@ impl Band<'_> {
             }
         }
     }
+}
+
+/// The first pixel with its middle at or after a place; none is before the picture.
+fn first(at: f32) -> usize {
+    let floor = (at - 0.5) as usize;
+    floor + usize::from((floor as f32) < at - 0.5)
+}
+
+/// The pixel after the last one with its middle at or before a place.
+fn past(at: f32) -> usize {
+    (at + 0.5) as usize
 }

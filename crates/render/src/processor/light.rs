@@ -114,7 +114,7 @@ fn vessels_over(colour: Vec3, ways: Vec3, in_sulcus: f32) -> Vec3 {
     let line = |low, high, way: f32| 1.0 - smoothstep(low, high, way.abs());
     let fine = colour.lerp(Vec3::new(0.66, 0.20, 0.17), 0.30 * line(0.03, 0.08, ways.z));
     let red = fine.lerp(Vec3::new(0.58, 0.09, 0.08), 0.6 * line(0.10, 0.20, ways.y));
-    red.lerp(Vec3::new(0.27, 0.07, 0.13), 0.85 * line(0.30, 0.45, ways.x) * in_sulcus)
+    red.lerp(Vec3::new(0.27, 0.07, 0.13), 0.85 * line(0.20, 0.32, ways.x) * in_sulcus)
 }
 
 /// Colour of the dura: pale, with vessels that branch; by the place at rest, mm.

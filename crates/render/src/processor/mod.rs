@@ -245,7 +245,7 @@ impl ProcessorRenderer {
                 }
             });
             if let Some(brain) = &self.brain {
-                contour::draw(pixels, width, *rectangle, brain.corners().filter_map(|t| plane.cut(t)));
+                contour::draw(pixels, width, *rectangle, brain.across(plane.level()).filter_map(|t| plane.cut(t)));
             }
         }
     }

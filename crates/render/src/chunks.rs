@@ -1,0 +1,101 @@
+//! Neighbouring triangles in chunks, with a ball around each: what is out of sight costs nothing.
+
+use crate::camera::View;
+use glam::{Vec2, Vec3, Vec4};
+use std::ops::Range;
+
+/// Triangles of a chunk, numerical.
+pub(crate) const MANY: usize = 64;
+/// Edge of the cubes by which triangles are sorted, mm, numerical: that of a chunk.
+const EDGE_MM: f32 = 8.0;
+
+/// Some triangles that follow one another.
+#[derive(Clone, Debug)]
+pub(crate) struct Chunk {
+    pub triangles: Range<usize>,
+    /// The ball around them at rest, world mm.
+    middle: Vec3,
+    radius_mm: f32,
+}
+
+/// Sorts triangles by where they lie.
+pub(crate) fn sort(triangles: &mut [[u32; 3]], places: &[Vec3]) {
+    triangles.sort_by_cached_key(|corners| (places[corners[0] as usize] / EDGE_MM).floor().as_ivec3().to_array());
+}
+
+impl Chunk {
+    /// Chunks of all triangles, over vertices at rest.
+    pub fn all(triangles: &[[u32; 3]], at_rest: &[Vec3]) -> Vec<Self> {
+        let chunk = |(n, some): (usize, &[[u32; 3]])| {
+            let places = || some.iter().flatten().map(|n| at_rest[*n as usize]);
+            let middle = places().sum::<Vec3>() / (3 * some.len()) as f32;
+            let radius_mm = places().map(|place| place.distance(middle)).fold(0.0, f32::max);
+            Self { triangles: MANY * n..MANY * n + some.len(), middle, radius_mm }
+        };
+        triangles.chunks(MANY).enumerate().map(chunk).collect()
+    }
+
+    /// A chunk that may lie anywhere.
+    pub fn anywhere(triangles: Range<usize>) -> Self {
+        Self { triangles, middle: Vec3::ZERO, radius_mm: f32::INFINITY }
+    }
+
+    /// Whether it may cross a plane, moved by so much at most, mm.
+    pub fn may_cross(&self, plane: Vec4, moved_mm: f32) -> bool {
+        let far = (plane.truncate().dot(self.middle) - plane.w).abs();
+        far.is_nan() || far <= self.radius_mm + moved_mm
+    }
+
+    /// The rows of a view of so many pixels in which it may be seen, moved by so much at most, mm;
+    /// none if it lies beside the view.
+    pub fn rows(&self, view: &View, size: Vec2, moved_mm: f32) -> Range<usize> {
+        let radius_mm = self.radius_mm + moved_mm;
+        let (at, depth) = view.project(self.middle);
+        let nearest_mm = depth - radius_mm;
+        if nearest_mm.is_nan() || nearest_mm <= View::NEAR_MM {
+            let is_behind = depth + radius_mm < View::NEAR_MM;
+            return 0..if is_behind { 0 } else { size.y as usize };
+        }
+        let aside = radius_mm * (1.0 / view.half + at.abs()) / nearest_mm;
+        let [low, high] = [at - aside, at + aside];
+        if low.x > 1.0 || high.x < -1.0 || low.y > 1.0 || high.y < -1.0 {
+            return 0..0;
+        }
+        let row = |up: f32| (0.5 - 0.5 * up) * size.y;
+        row(high.y).max(0.0) as usize..(row(low.y) as usize + 1).min(size.y as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Camera;
+
+    #[test]
+    fn no_vertex_is_seen_or_cut_outside_what_its_chunk_says() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let size = Vec2::new(320.0, 200.0);
+        let mut skipped = 0;
+        for _ in 0..300 {
+            let mut unit = || 2.0 * random.f32() - 1.0;
+            let mut vector = |mm: f32| mm * Vec3::new(unit(), unit(), unit());
+            let corner = vector(80.0);
+            let rest = [corner, corner + vector(4.0), corner + vector(4.0)];
+            let chunk = &Chunk::all(&[[0, 1, 2]], &rest)[0];
+            let now = rest.map(|place| place + vector(1.0));
+            let view = Camera::viewed_from(vector(40.0), vector(1.0), 60.0).view(1.6);
+            let rows = chunk.rows(&view, size, 3f32.sqrt());
+            skipped += usize::from(rows.is_empty());
+            for place in now {
+                let (at, depth) = view.project(place);
+                if depth > View::NEAR_MM && at.abs().max_element() < 1.0 {
+                    assert!(rows.contains(&(((0.5 - 0.5 * at.y) * size.y) as usize)), "{rows:?}, {at}");
+                }
+            }
+            let plane = vector(1.0).normalize().extend(vector(30.0).x);
+            let over = now.map(|place| plane.truncate().dot(place) >= plane.w);
+            assert!(over == [over[0]; 3] || chunk.may_cross(plane, 3f32.sqrt()));
+        }
+        assert!((30..270).contains(&skipped), "{skipped} of 300");
+    }
+}
