@@ -34,9 +34,22 @@ fn past(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     return ball * pass_by(gap, on_beam);
 }
 
+const DIPLOE_HU = vec2f(800.0, 1350.0);    // up to the first it is diploe, from the second on a table
+
 fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
     let inside = hu(grid_of(point - normal * 1.2));
-    return mix(vec3f(0.80, 0.62, 0.50), vec3f(0.93, 0.89, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
+    let grown = mix(vec3f(0.80, 0.62, 0.50), vec3f(0.93, 0.89, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
+    // The CT is denser than the isovalue where a tool made the surface: pale tables, red diploe.
+    let here = hu(grid_of(point));
+    let cut = mix(vec3f(0.58, 0.27, 0.21), vec3f(0.92, 0.85, 0.73), smoothstep(DIPLOE_HU.x, DIPLOE_HU.y, here));
+    return mix(grown, cut, smoothstep(scene.dims.w + 80.0, scene.dims.w + 240.0, here));
+}
+
+// Tissue without its pia, as in the walls of a hole: grey matter is pink, white matter cream.
+fn bare_colour(rest: vec3f) -> vec3f {
+    let signal = textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0);
+    let flesh = mix(vec3f(0.66, 0.38, 0.34), vec3f(0.92, 0.78, 0.64), smoothstep(0.35, 0.75, signal.w));
+    return tinted(flesh, signal);
 }
 
 fn brain_colour(rest: vec3f) -> vec3f {
@@ -139,7 +152,8 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, look: vec4f, at_rest: v
         return lit(dura_colour(rest), select(normal, -normal, dot(normal, along) > 0.0), along, open, key, 0.25);
     }
     let in_sulcus = 1.0 - smoothstep(0.65, 0.95, 2.0 * look.w);
-    let flesh = vessels_over(brain_colour(rest - BELOW_MM * normal), look.xyz, in_sulcus);
+    var flesh = vessels_over(brain_colour(rest - BELOW_MM * normal), look.xyz, in_sulcus);
+    if look.w > 0.5 && scene.eye.w != 0.0 { flesh = bare_colour(rest); }
     let colour = stained(painted_brain(flesh, rest), at_rest.w);
     return lit(colour.xyz, normal, along, open, key, 0.35 + 0.15 * colour.w);
 }

@@ -15,8 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let number = |at: usize, default| arguments.get(at).map_or(Ok(default), |a| a.parse());
     let size = [number(1, 640)?, number(2, 480)?];
     let bone = Arc::new(BoneVolume::new(&ct, 400)?);
-    let (middle, data) =
-        (bone.bounds().centre(), SceneData { bone: Some(bone), brain: None, mri: None, tint: None, cortex: None });
+    let (middle, data) = (bone.bounds().centre(), SceneData { bone: Some(bone), ..SceneData::default() });
     let views = [Vec3::Y, Vec3::new(0.7, 0.6, 0.9), Vec3::X, Vec3::new(-0.5, 1.0, 0.2)];
     let frames = views.map(|v| Frame::of(Camera::viewed_from(middle, v, 450.0)));
     let mut processor = ProcessorRenderer::new(&data, size)?;

@@ -23,8 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bone = Arc::new(BoneVolume::new(&ct, 400)?);
     let bounds = bone.bounds();
     let gpu = Gpu::open(Prefer::Hardware)?;
-    let data =
-        SceneData { bone: Some(bone.clone()), brain: brain.as_ref(), mri: mri.as_ref(), tint: None, cortex: None };
+    let data = SceneData { bone: Some(bone.clone()), brain: brain.as_ref(), mri: mri.as_ref(), ..Default::default() };
     let mut renderer = Renderer::new(&gpu, &data, [960, 720])?;
     let towards_eye = Vec3::new(0.7, 0.6, 0.9);
     let camera = Camera::viewed_from(bounds.centre() + 25.0 * Vec3::Z, towards_eye, 1.5 * bounds.size().max_element());

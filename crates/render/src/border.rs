@@ -1,4 +1,4 @@
-//! What is seen of the brain: a fine cortex, or the boundary of the tetrahedra, with smooth normals.
+//! What is seen of the brain: a cortex, or the boundary of the tetrahedra, with smooth normals.
 //!
 //! # Practice
 //! With a cortex its vertices sit in the tetrahedra and move with them; the faces that a resection
@@ -6,8 +6,8 @@
 
 use crate::chunks::{self, Chunk, MANY};
 use crate::cut::height;
+use crate::embedding::{Embedding, NO_TET, embeddings};
 use crate::frame::Cortex;
-use crate::seats::{NO_TET, Seat, seats};
 use crate::touch::touch;
 use crate::{Leaves, RenderError};
 use glam::{Vec3, Vec4};
@@ -24,7 +24,7 @@ pub(crate) struct Border {
     /// Which of its tetrahedra are gone; empty where none is.
     gone: Vec<bool>,
     /// Vertices of what is shown, in the tetrahedra.
-    seats: Vec<Seat>,
+    embeddings: Vec<Embedding>,
     /// Triangles over the vertices.
     pub triangles: Vec<[u32; 3]>,
     /// All triangles in chunks.
@@ -63,7 +63,7 @@ struct Whole {
     tets: Vec<[u32; 4]>,
     /// Faces of the boundary; empty without a cortex.
     faces: Vec<[u32; 3]>,
-    seats: Vec<Seat>,
+    embeddings: Vec<Embedding>,
     triangles: Vec<[u32; 3]>,
     open: Vec<f32>,
 }
@@ -75,16 +75,19 @@ const DARK_MM: f32 = 3.5;
 /// Light of the surroundings deep in a sulcus, numerical.
 const DARKEST: f32 = 0.25;
 
-/// Look of what bears no vessels and lies open.
-const BARE: Vec4 = Vec4::ONE;
+/// Look of what bears no vessels.
+const BARE: Vec4 = Vec4::new(1.0, 1.0, 1.0, PIA);
+/// Light of the surroundings that reaches what lies open under its pia; bare tissue has more.
+pub(crate) const PIA: f32 = 0.99;
 /// Numbers of waves of veins, arteries and their branches, 1/mm, numerical: veins lie some 20 mm
 /// apart, branches 5 mm.
 const WAVES: [f32; 3] = [0.16, 0.19, 0.57];
 /// Distance from a vessel that counts, mm, numerical.
 const BESIDE_MM: f32 = 2.0;
 
-/// Ways along the surface to a vein, an artery and a branch, of 2 mm, from -1 to 1, by the place at
-/// rest, mm, and the normal there.
+/// Ways along the surface to a vein, an artery and a branch, of 2 mm, from -1 to 1.
+///
+/// By the place at rest, mm, and the normal there.
 fn vessels(rest: Vec3, normal: Vec3) -> Vec3 {
     let Vec3 { x, y, z } = rest;
     let Vec3 { x: nx, y: ny, z: nz } = normal;
@@ -118,29 +121,29 @@ impl Whole {
         let surface = Surface::of(mesh);
         let tets = mesh.tets.clone();
         if let Some(Cortex { surface: fine, depth_mm }) = cortex {
-            let open = |mm: &f32| DARKEST + (1.0 - DARKEST) * (-mm / DARK_MM).exp();
+            let open = |mm: &f32| DARKEST + (PIA - DARKEST) * (-mm / DARK_MM).exp();
             let mut open: Vec<f32> = depth_mm.iter().map(open).collect();
-            open.resize(fine.positions.len(), 1.0);
-            let seats = seats(mesh, &fine.positions);
+            open.resize(fine.positions.len(), PIA);
+            let embeddings = embeddings(mesh, &fine.positions);
             let mut triangles = fine.triangles.clone();
             chunks::sort(&mut triangles, &fine.positions);
-            return Self { tets, faces: surface.triangles, seats, triangles, open };
+            return Self { tets, faces: surface.triangles, embeddings, triangles, open };
         }
-        let (seats, triangles) = on_nodes(&surface.triangles);
-        let open = vec![1.0; seats.len()];
-        Self { tets, faces: Vec::new(), seats, triangles, open }
+        let (embeddings, triangles) = on_nodes(&surface.triangles);
+        let open = vec![PIA; embeddings.len()];
+        Self { tets, faces: Vec::new(), embeddings, triangles, open }
     }
 }
 
-/// Triangles over nodes as triangles over seats.
-fn on_nodes(triangles: &[[u32; 3]]) -> (Vec<Seat>, Vec<[u32; 3]>) {
+/// Triangles over nodes as triangles over embeddings.
+fn on_nodes(triangles: &[[u32; 3]]) -> (Vec<Embedding>, Vec<[u32; 3]>) {
     let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
     nodes.sort_unstable();
     nodes.dedup();
     // Every corner is in the sorted list, which was made from the corners.
     let local = |n: u32| nodes.partition_point(|&m| m < n) as u32;
     let triangles = triangles.iter().map(|t| t.map(local)).collect();
-    (nodes.into_iter().map(Seat::node).collect(), triangles)
+    (nodes.into_iter().map(Embedding::node).collect(), triangles)
 }
 
 impl Border {
@@ -150,7 +153,7 @@ impl Border {
         let (rest, now, tets) = (mesh.positions.clone(), mesh.positions.clone(), mesh.tets.clone());
         let mut made = Self {
             gone: Vec::new(),
-            seats: whole.seats.clone(),
+            embeddings: whole.embeddings.clone(),
             triangles: whole.triangles.clone(),
             chunks: Vec::new(),
             moved_mm: 0.0,
@@ -174,12 +177,12 @@ impl Border {
 
     /// Makes the values of all vertices anew, without the dura.
     fn shown(&mut self) {
-        self.at_rest = self.seats.iter().map(|seat| seat.place(&self.rest)).collect();
-        self.places = self.seats.iter().map(|seat| seat.place(&self.now)).collect();
-        self.normals = vec![Vec3::ZERO; self.seats.len()];
-        self.stains = vec![0.0; self.seats.len()];
+        self.at_rest = self.embeddings.iter().map(|embedding| embedding.place(&self.rest)).collect();
+        self.places = self.embeddings.iter().map(|embedding| embedding.place(&self.now)).collect();
+        self.normals = vec![Vec3::ZERO; self.embeddings.len()];
+        self.stains = vec![0.0; self.embeddings.len()];
         let has_vessels = !self.faces.is_empty();
-        self.looks = vec![BARE; self.seats.len()];
+        self.looks = vec![BARE; self.embeddings.len()];
         if has_vessels {
             smooth_normals(&self.at_rest, &self.triangles, &mut self.normals);
             let vertices = self.at_rest.par_iter().zip(&self.normals).zip(&self.open);
@@ -207,21 +210,21 @@ impl Border {
         let mut bared = Surface::of(&mesh).triangles;
         (self.rest, self.tets) = (mesh.positions, mesh.tets);
         if whole.faces.is_empty() {
-            (self.seats, self.triangles) = on_nodes(&bared);
-            self.open = vec![1.0; self.seats.len()];
+            (self.embeddings, self.triangles) = on_nodes(&bared);
+            self.open = vec![PIA; self.embeddings.len()];
         } else {
             self.faces.clone_from(&bared);
             let before: BTreeSet<_> = whole.faces.iter().copied().map(sorted).collect();
             bared.retain(|face| !before.contains(&sorted(*face)));
             let (walls, faces) = on_nodes(&bared);
             // What straddles the edge stays: it covers the gap to the wall.
-            let stays = |corners: &&[u32; 3]| corners.iter().any(|n| !is_gone(whole.seats[*n as usize].tet));
-            let first = whole.seats.len() as u32;
+            let stays = |corners: &&[u32; 3]| corners.iter().any(|n| !is_gone(whole.embeddings[*n as usize].tet));
+            let first = whole.embeddings.len() as u32;
             self.triangles = whole.triangles.iter().filter(stays).copied().collect();
             self.triangles.extend(faces.into_iter().map(|corners| corners.map(|n| n + first)));
-            self.seats = [&whole.seats[..], &walls[..]].concat();
+            self.embeddings = [&whole.embeddings[..], &walls[..]].concat();
             self.open.clone_from(&whole.open);
-            self.open.resize(self.seats.len(), 1.0);
+            self.open.resize(self.embeddings.len(), 1.0);
         }
         self.shown();
         true
@@ -235,7 +238,7 @@ impl Border {
         if given != wanted || triangles.iter().flatten().any(|&n| n as usize >= wanted) {
             return Err(RenderError::Nodes { wanted, given });
         }
-        let brain = self.seats.len();
+        let brain = self.embeddings.len();
         let moved = triangles.iter().map(|corners| corners.map(|n| n + brain as u32));
         let is_other = wanted != self.leaves || !self.triangles[self.own..].iter().copied().eq(moved.clone());
         if is_other {
@@ -255,8 +258,9 @@ impl Border {
         Ok(is_other)
     }
 
-    /// Updates the vertices from the mesh's nodes, or resets them to rest, and draws them onto what
-    /// the balls of tools touch, with their radii, mm.
+    /// Updates the vertices from the mesh's nodes, or resets them to rest.
+    ///
+    /// They are drawn onto what the balls of tools touch, with their radii, mm.
     pub fn follow(&mut self, positions: Option<&[Vec3]>, balls: &[(Vec3, f32)]) -> Result<(), RenderError> {
         let positions = positions.unwrap_or(&self.rest);
         let (given, wanted) = (positions.len(), self.rest.len());
@@ -265,10 +269,10 @@ impl Border {
         }
         self.now.copy_from_slice(positions);
         let now = &self.now;
-        self.places.par_iter_mut().zip(&self.seats).for_each(|(place, seat)| *place = seat.place(now));
-        touch(&mut self.places[..self.seats.len()], &self.faces, &self.now, balls);
+        self.places.par_iter_mut().zip(&self.embeddings).for_each(|(place, embedding)| *place = embedding.place(now));
+        touch(&mut self.places[..self.embeddings.len()], &self.faces, &self.now, balls);
         smooth_normals(&self.places, &self.triangles, &mut self.normals);
-        let ways = self.places[..self.seats.len()].par_iter().zip(&self.at_rest);
+        let ways = self.places[..self.embeddings.len()].par_iter().zip(&self.at_rest);
         let moved = ways.map(|(place, rest)| place.distance_squared(*rest)).reduce(|| 0.0, f32::max);
         self.moved_mm = moved.sqrt();
         Ok(())
@@ -278,15 +282,15 @@ impl Border {
     pub fn stain(&mut self, stains: Option<&[u8]>) {
         let mm = |stain: u8| if stain == u8::MAX { -1.0 } else { 0.01 * f32::from(stain) };
         let of = |node: u32| stains.and_then(|all| all.get(node as usize)).map_or(0.0, |stain| mm(*stain));
-        for (stain, seat) in self.stains.iter_mut().zip(&self.seats) {
-            *stain = match (stains, seat.tet) {
+        for (stain, embedding) in self.stains.iter_mut().zip(&self.embeddings) {
+            *stain = match (stains, embedding.tet) {
                 (None, _) => 0.0,
-                (_, NO_TET) => of(seat.nodes[0]),
+                (_, NO_TET) => of(embedding.nodes[0]),
                 // That of the nearest node which has one: inner nodes have none.
                 _ => {
-                    let near = (0..4).filter(|k| of(seat.nodes[*k]) != 0.0 && seat.weights[*k] > 0.0);
+                    let near = (0..4).filter(|k| of(embedding.nodes[*k]) != 0.0 && embedding.weights[*k] > 0.0);
                     let (sum, all) = near.fold((0.0, 0.0), |(sum, all), k| {
-                        (sum + seat.weights[k] * of(seat.nodes[k]), all + seat.weights[k])
+                        (sum + embedding.weights[k] * of(embedding.nodes[k]), all + embedding.weights[k])
                     });
                     if all > 0.0 { sum / all * all.min(1.0) } else { 0.0 }
                 }

@@ -46,8 +46,9 @@ impl Chunk {
         far.is_nan() || far <= self.radius_mm + moved_mm
     }
 
-    /// The rows of a view of so many pixels in which it may be seen, moved by so much at most, mm;
-    /// none if it lies beside the view.
+    /// The rows of a view in which it may be seen; none if it lies beside the view.
+    ///
+    /// The view has so many pixels, and it moved by so much at most, mm.
     pub fn rows(&self, view: &View, size: Vec2, moved_mm: f32) -> Range<usize> {
         let radius_mm = self.radius_mm + moved_mm;
         let (at, depth) = view.project(self.middle);

@@ -10,7 +10,7 @@ use trepan_mesh::{TetMesh, TriMesh};
 use trepan_volume::VoxelVolume;
 
 /// The scene data that stays constant during a session.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SceneData<'a> {
     /// The skull, if there was a CT; its changes are rendered.
     pub bone: Option<Arc<BoneVolume>>,

@@ -3,8 +3,9 @@
 //! # Theory
 //! Bone is the isosurface of a trilinear density: along a ray each voxel cell is a cubic, whose
 //! first root is computed exactly. Empty space is skipped by the chessboard distance to the nearest
-//! brick with bone. The brain is the boundary of its tetrahedra. One lighting pass combines the
-//! hits of bone and brain with the tool, a ball and a cylinder in closed form.
+//! brick with bone. The brain is a fine cortex that its tetrahedra move, or their boundary. One
+//! lighting pass combines the hits of bone and brain with the tool, a ball and a cylinder in closed
+//! form.
 //!
 //! # Practice
 //! Create a [`Renderer`] once per scene, then [`draw`](Renderer::draw) a [`Frame`] and take its
@@ -30,6 +31,7 @@ mod chunks;
 mod cut;
 mod device;
 mod drilled;
+mod embedding;
 mod error;
 mod frame;
 mod image;
@@ -45,7 +47,6 @@ mod processor;
 mod recast;
 mod report;
 mod scene;
-mod seats;
 mod section;
 mod slice;
 mod smooth;

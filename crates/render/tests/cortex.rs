@@ -1,11 +1,9 @@
 //! A fine cortex over coarse tetrahedra: what is seen does not depend on them.
 
-mod scene;
-
 use glam::{DAffine3, DVec3, Vec3};
-use scene::device;
+use trepan_gpu::adapter_for_tests as device;
 use trepan_mesh::{TetMesh, TriMesh, lattice, surface_nets};
-use trepan_render::{Camera, Cortex, Frame, Image, ProcessorRenderer, SceneData, SliceLook};
+use trepan_render::{Camera, Cortex, Frame, Image, ProcessorRenderer, Renderer, SceneData, SliceLook};
 use trepan_volume::VoxelVolume;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -71,7 +69,7 @@ fn device_and_processor_draw_the_same_cortex_also_where_tetrahedra_are_gone() {
     let (surface, depth_mm, [mesh, _]) = brain();
     let cortex = Some(Cortex { surface: &surface, depth_mm: &depth_mm });
     let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None, cortex };
-    let mut on_device = scene::renderer(&gpu, &data, SIZE);
+    let mut on_device = Renderer::new(&gpu, &data, SIZE).expect("the scene loads");
     let mut on_processor = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
     let middle = |tet: &[u32; 4]| tet.iter().map(|n| mesh.positions[*n as usize]).sum::<Vec3>() / 4.0;
     let gone: Vec<bool> = mesh.tets.iter().map(|tet| middle(tet).distance(Vec3::new(16.0, 12.0, 6.0)) < 12.0).collect();

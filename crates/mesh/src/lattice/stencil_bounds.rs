@@ -109,7 +109,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
     fn angles_of_one_label_stay_within_the_stated_bounds_whatever_the_surface(seed in any::<u64>()) {
-        // Over 161.7 degrees are only elements with all nodes on boundaries, which it does not cover.
+        // Over 161.7 degrees are only elements with all nodes on boundaries, not covered by it.
         let mesh = stuff(&uniform(20.0, 1.0), &Noise { seed, labels: 2 }).mesh;
         let quality = Quality::of(&mesh);
         prop_assert!(quality.min_mm3 > 0.0);

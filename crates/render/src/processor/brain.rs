@@ -195,8 +195,8 @@ impl Band<'_> {
     fn triangle(&mut self, number: u32, corners: [&Vertex; 3], one_sided: bool, is_left: impl Fn([f32; 3]) -> bool) {
         let [a, b, c] = corners.map(|v| v.at);
         let double_area = (b - a).perp_dot(c - a);
-        // Pictures have y downwards: what faces the eye is clockwise. Degenerate triangles and those
-        // with a non-finite position are skipped.
+        // Pictures have y downwards: what faces the eye is clockwise. Degenerate triangles and
+        // those with a non-finite position are skipped.
         if one_sided && double_area > 0.0 || double_area == 0.0 || !double_area.is_finite() {
             return;
         }

@@ -5,7 +5,7 @@ use super::brain::Fragment;
 use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
 use super::tool::{ToolHit, lit};
-use crate::border::{DURA, wave};
+use crate::border::{DURA, PIA, wave};
 use crate::bricks::NOTHING;
 use crate::mix::trilinear;
 use crate::mri::Signals;
@@ -102,8 +102,11 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
         return lit(scene, dura_colour(brain.rest), normal, along, open, key, 0.25);
     }
     let in_sulcus = 1.0 - smoothstep(0.65, 0.95, brain.open);
-    let flesh = brain_colour(inputs.mri, brain.rest - BELOW_MM * brain.normal);
-    let colour = painted(vessels_over(flesh, brain.ways, in_sulcus));
+    let flesh = match inputs.mri {
+        Some(signals) if brain.open > 0.5 * (1.0 + PIA) => bare_colour(signals, brain.rest),
+        mri => vessels_over(brain_colour(mri, brain.rest - BELOW_MM * brain.normal), brain.ways, in_sulcus),
+    };
+    let colour = painted(flesh);
     let (colour, film) = stained(colour, brain.stain);
     lit(scene, colour, brain.normal, along, open, key, 0.35 + 0.15 * film)
 }
@@ -161,11 +164,26 @@ fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
     by_ball * pass_by(gap, on_beam)
 }
 
+/// Densities up to which a cut face is diploe, and from which on a table, HU, numerical.
+const DIPLOE_HU: [f32; 2] = [800.0, 1350.0];
+
 fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
     let inside = inputs.bricks.hu(inputs.bricks.grid_of(point - normal * 1.2));
     let isovalue = inputs.scene.dims.w;
     let dense = smoothstep(isovalue, isovalue + 500.0, inside);
-    Vec3::new(0.80, 0.62, 0.50).lerp(Vec3::new(0.93, 0.89, 0.80), dense)
+    let grown = Vec3::new(0.80, 0.62, 0.50).lerp(Vec3::new(0.93, 0.89, 0.80), dense);
+    // The CT is denser than the isovalue where a tool made the surface: pale tables, red diploe.
+    let here = inputs.bricks.hu(inputs.bricks.grid_of(point));
+    let made = smoothstep(isovalue + 80.0, isovalue + 240.0, here);
+    let table = smoothstep(DIPLOE_HU[0], DIPLOE_HU[1], here);
+    grown.lerp(Vec3::new(0.58, 0.27, 0.21).lerp(Vec3::new(0.92, 0.85, 0.73), table), made)
+}
+
+/// Tissue without its pia, as in the walls of a hole: grey matter is pink, white matter cream.
+fn bare_colour(signals: &Signals, rest: Vec3) -> Vec3 {
+    let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
+    let white = smoothstep(0.35, 0.75, signal.w);
+    tinted(Vec3::new(0.66, 0.38, 0.34).lerp(Vec3::new(0.92, 0.78, 0.64), white), signal)
 }
 
 /// Depth below the surface at which the MRI is sampled, mm, numerical: where grey matter is.

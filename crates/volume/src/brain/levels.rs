@@ -47,8 +47,9 @@ impl Levels {
     }
 }
 
-/// Signal halfway between CSF and grey matter in a T1 MRI, by what lies deep in a mask of the brain
-/// on its grid; `None` if that is too little or uniform.
+/// Signal halfway between CSF and grey matter in a T1 MRI, by what lies deep in the brain.
+///
+/// The mask of the brain is on its grid. `None` if too little lies deep or all is one value.
 pub fn grey_level(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>) -> Option<f32> {
     Levels::within(mri, mask).map(|levels| levels.least)
 }

@@ -51,7 +51,7 @@ fn judge(head: &BaseHead, scope: Scope, findings: &mut Findings) {
         lattice::tetrahedra(&head.brain, &config).expect("the brain has a mesh")
     });
     let middle = seen.surface.bounds().centre();
-    let [draft, fine] = meshes.each_ref().map(|mesh| Drawn::of(mesh, cortex, middle).outline());
+    let [draft, fine] = meshes.each_ref().map(|mesh| View::of(mesh, cortex, middle).outline());
     let pixels = draft.iter().filter(|is| **is).count();
     let differ = draft.iter().zip(&fine).filter(|(a, b)| a != b).count() as f64 / pixels as f64;
     let name = head.name;
@@ -64,7 +64,7 @@ fn judge(head: &BaseHead, scope: Scope, findings: &mut Findings) {
         .metric("off_p95_mm", p95_mm)
         .metric("outlines_differ_percent", 100.0 * differ);
     for (with, cortex) in [("with_ms", cortex), ("without_ms", None)] {
-        let mut drawn = Drawn::of(&meshes[1], cortex, middle);
+        let mut drawn = View::of(&meshes[1], cortex, middle);
         let sways: Vec<Vec<Vec3>> = (0..4).map(|turn| swaying(&meshes[1], turn)).collect();
         drawn.draw(1, Some(&sways[1]));
         let times = Samples::of(scope.pick(4, 20), |turn| drawn.draw(turn, Some(&sways[turn % 4])));
@@ -78,12 +78,12 @@ fn judge(head: &BaseHead, scope: Scope, findings: &mut Findings) {
 }
 
 /// A brain before the camera.
-struct Drawn {
+struct View {
     renderer: ProcessorRenderer,
     middle: Vec3,
 }
 
-impl Drawn {
+impl View {
     fn of(mesh: &TetMesh, cortex: Option<Cortex>, middle: Vec3) -> Self {
         let data = SceneData { bone: None, brain: Some(mesh), mri: None, tint: None, cortex };
         let renderer = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");

@@ -17,7 +17,7 @@ use trepan_mesh::TetMesh;
 
 /// A vertex as a weighted sum of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Seat {
+pub(crate) struct Embedding {
     pub nodes: [u32; 4],
     pub weights: [f32; 4],
     /// Added to that sum, mm.
@@ -26,10 +26,10 @@ pub(crate) struct Seat {
     pub tet: u32,
 }
 
-/// The tetrahedron of a seat that is a node.
+/// The tetrahedron of a embedding that is a node.
 pub(crate) const NO_TET: u32 = u32::MAX;
 
-impl Seat {
+impl Embedding {
     /// A node itself.
     pub fn node(node: u32) -> Self {
         Self { nodes: [node; 4], weights: [1.0, 0.0, 0.0, 0.0], offset: Vec3::ZERO, tet: NO_TET }
@@ -93,14 +93,14 @@ impl Cells {
 /// Weight of a corner beyond which a vertex is too far outside its tetrahedron, numerical.
 const LEAST_WEIGHT: f32 = -2.0;
 
-/// A seat for each place, in a mesh at rest; what is too far from it keeps its distance to the
+/// A embedding for each place, in a mesh at rest; what is too far from it keeps its distance to the
 /// nearest node.
-pub(crate) fn seats(mesh: &TetMesh, places: &[Vec3]) -> Vec<Seat> {
+pub(crate) fn embeddings(mesh: &TetMesh, places: &[Vec3]) -> Vec<Embedding> {
     use rayon::prelude::*;
     let cells = Cells::of(mesh);
     let weights_in: Vec<(Mat3, Vec3)> =
         mesh.tets.iter().map(|tet| inverse(tet.map(|n| mesh.positions[n as usize]))).collect();
-    let seat = |place: &Vec3| {
+    let embedding = |place: &Vec3| {
         let weights = |tet: u32| {
             let (inverse, corner) = weights_in[tet as usize];
             let w = inverse * (*place - corner);
@@ -111,14 +111,14 @@ pub(crate) fn seats(mesh: &TetMesh, places: &[Vec3]) -> Vec<Seat> {
         let all = all.filter(|(_, weights)| weights.iter().all(|w| w.is_finite()));
         let best = all.max_by(|(_, a), (_, b)| least(a).total_cmp(&least(b)));
         match best.filter(|(_, weights)| least(weights) > LEAST_WEIGHT) {
-            Some((tet, weights)) => Seat { nodes: mesh.tets[tet as usize], weights, offset: Vec3::ZERO, tet },
+            Some((tet, weights)) => Embedding { nodes: mesh.tets[tet as usize], weights, offset: Vec3::ZERO, tet },
             None => {
                 let node = nearest(mesh, *place);
-                Seat { offset: *place - mesh.positions[node as usize], ..Seat::node(node) }
+                Embedding { offset: *place - mesh.positions[node as usize], ..Embedding::node(node) }
             }
         }
     };
-    places.par_iter().map(seat).collect()
+    places.par_iter().map(embedding).collect()
 }
 
 /// Maps a place, relative to the first corner, to the weights of the others; NaN when flat.
@@ -163,16 +163,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_linear_motion_moves_every_seat_exactly(
+        fn a_linear_motion_moves_every_vertex_exactly(
             places in prop::collection::vec((-1.5f32..16.5, -1.5f32..11.5, -1.5f32..11.5), 30),
         ) {
             let mesh = block();
             let places: Vec<Vec3> = places.into_iter().map(Vec3::from).collect();
             let motion = |p: Vec3| Vec3::new(1.1 * p.x - 0.2 * p.z, p.y + 0.3 * p.x, 0.9 * p.z) + 2.0;
             let moved: Vec<Vec3> = mesh.positions.iter().map(|p| motion(*p)).collect();
-            for (seat, place) in seats(&mesh, &places).iter().zip(&places) {
-                prop_assert!(seat.place(&mesh.positions).distance(*place) < 1e-4);
-                prop_assert!(seat.place(&moved).distance(motion(*place)) < 1e-3);
+            for (embedding, place) in embeddings(&mesh, &places).iter().zip(&places) {
+                prop_assert!(embedding.place(&mesh.positions).distance(*place) < 1e-4);
+                prop_assert!(embedding.place(&moved).distance(motion(*place)) < 1e-3);
             }
         }
     }
@@ -181,8 +181,8 @@ mod tests {
     fn what_is_far_outside_follows_the_nearest_node_and_no_mesh_gives_none_a_panic() {
         let mesh = block();
         let far = Vec3::new(90.0, 0.0, 0.0);
-        assert_eq!(seats(&mesh, &[far]), [Seat { offset: far - mesh.positions[3], ..Seat::node(3) }]);
+        assert_eq!(embeddings(&mesh, &[far]), [Embedding { offset: far - mesh.positions[3], ..Embedding::node(3) }]);
         let flat = TetMesh { positions: vec![Vec3::ZERO; 4], tets: vec![[0, 1, 2, 3]] };
-        assert_eq!(seats(&flat, &[Vec3::X]), [Seat { offset: Vec3::X, ..Seat::node(0) }]);
+        assert_eq!(embeddings(&flat, &[Vec3::X]), [Embedding { offset: Vec3::X, ..Embedding::node(0) }]);
     }
 }
