@@ -36,7 +36,7 @@ pub use error::GpuError;
 pub use gpu::adapter_for_tests;
 pub use gpu::{Faults, Gpu, PATIENCE, Prefer};
 pub use kernel::Kernel;
-pub use pipeline::{Pipeline, PipelineSpec, Topology};
+pub use pipeline::{DepthTest, Pipeline, PipelineSpec, Topology};
 pub use readback::Readback;
 pub use record::{Depth, Dispatches, DrawTarget, Draws, Recorder, Target};
 pub use texture::{Format, Texture, TextureSpec};

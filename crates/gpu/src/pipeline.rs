@@ -13,6 +13,22 @@ pub enum Topology {
     Lines,
 }
 
+/// Which fragments are kept; depth grows away from the eye.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthTest {
+    /// All; the pass has no depth texture.
+    #[default]
+    Off,
+    /// All, and the depth texture stays as it is.
+    Ignored,
+    /// The nearest so far.
+    Nearest,
+    /// The nearest so far of triangles that are counterclockwise to the eye.
+    NearestFront,
+    /// The nearest so far of the other triangles, of which only the depth is kept.
+    BackDepth,
+}
+
 /// Parameters of a pipeline; entry points are `vertex` and `fragment`, bindings are in group 0.
 #[derive(Clone, Copy, Debug)]
 pub struct PipelineSpec<'a> {
@@ -24,8 +40,8 @@ pub struct PipelineSpec<'a> {
     pub slots: &'a [Slot],
     /// Formats of the textures that it renders to.
     pub targets: &'a [Format],
-    /// Whether depth testing is on (depth grows away from the eye).
-    pub depth: bool,
+    /// Which fragments are kept.
+    pub depth: DepthTest,
     /// Whether colours are alpha-blended over the target.
     pub blend: bool,
     /// Primitive topology.
@@ -68,19 +84,27 @@ fn compile(gpu: &Gpu, spec: &PipelineSpec) -> Pipeline {
         immediate_size: 0,
     });
     let blend = spec.blend.then_some(wgpu::BlendState::ALPHA_BLENDING);
-    let target =
-        |f: &Format| Some(wgpu::ColorTargetState { format: f.raw(), blend, write_mask: wgpu::ColorWrites::ALL });
+    let write_mask =
+        if spec.depth == DepthTest::BackDepth { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
+    let target = |f: &Format| Some(wgpu::ColorTargetState { format: f.raw(), blend, write_mask });
     let targets: Vec<_> = spec.targets.iter().map(target).collect();
-    let depth_stencil = spec.depth.then(|| wgpu::DepthStencilState {
+    let compare =
+        if spec.depth == DepthTest::Ignored { wgpu::CompareFunction::Always } else { wgpu::CompareFunction::Less };
+    let depth_stencil = (spec.depth != DepthTest::Off).then(|| wgpu::DepthStencilState {
         format: Format::Depth32Float.raw(),
-        depth_write_enabled: Some(true),
-        depth_compare: Some(wgpu::CompareFunction::Less),
+        depth_write_enabled: Some(spec.depth != DepthTest::Ignored),
+        depth_compare: Some(compare),
         stencil: Default::default(),
         bias: Default::default(),
     });
     let topology = match spec.topology {
         Topology::Triangles => wgpu::PrimitiveTopology::TriangleList,
         Topology::Lines => wgpu::PrimitiveTopology::LineList,
+    };
+    let cull_mode = match spec.depth {
+        DepthTest::NearestFront => Some(wgpu::Face::Back),
+        DepthTest::BackDepth => Some(wgpu::Face::Front),
+        _ => None,
     };
     let raw = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(spec.label),
@@ -91,7 +115,7 @@ fn compile(gpu: &Gpu, spec: &PipelineSpec) -> Pipeline {
             compilation_options: Default::default(),
             buffers: &[],
         },
-        primitive: wgpu::PrimitiveState { topology, ..Default::default() },
+        primitive: wgpu::PrimitiveState { topology, cull_mode, ..Default::default() },
         depth_stencil,
         multisample: Default::default(),
         fragment: Some(wgpu::FragmentState {

@@ -112,7 +112,7 @@ fn the_nearer_of_two_triangles_is_seen_inside_the_scissor() {
         wgsl,
         slots: &[Slot::Storage],
         targets: &targets,
-        depth: true,
+        depth: DepthTest::Nearest,
         blend: false,
         topology: Topology::Triangles,
     };

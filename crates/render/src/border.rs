@@ -52,7 +52,7 @@ pub(crate) struct Border {
     /// Light of the surroundings that reaches each of the brain's vertices, 0 to 1.
     open: Vec<f32>,
     /// The brain's own triangles, before those of the dura.
-    own: usize,
+    pub own: usize,
     /// Vertices of the dura, after the brain's.
     leaves: usize,
 }
@@ -298,9 +298,9 @@ impl Border {
         }
     }
 
-    /// Whether a triangle is of a surface that closes around the brain.
-    pub fn is_closed_at(&self, triangle: usize) -> bool {
-        !self.faces.is_empty() && triangle < self.own
+    /// Whether the brain's own triangles close around it, as those of a cortex.
+    pub fn is_closed(&self) -> bool {
+        !self.faces.is_empty()
     }
 
     /// The brain's current triangles that cross a plane, without the dura.

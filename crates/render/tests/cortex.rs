@@ -3,10 +3,12 @@
 use glam::{DAffine3, DVec3, Vec3};
 use trepan_gpu::adapter_for_tests as device;
 use trepan_mesh::{TetMesh, TriMesh, lattice, surface_nets};
-use trepan_render::{Camera, Cortex, Frame, Image, ProcessorRenderer, Renderer, SceneData, SliceLook};
+use trepan_render::{Camera, Cortex, Cut, Frame, Image, ProcessorRenderer, Renderer, SceneData, SliceLook};
 use trepan_volume::VoxelVolume;
 
 const SIZE: [u32; 2] = [320, 240];
+/// From the middle towards the eye.
+const EYE: Vec3 = Vec3::new(1.0, 0.6, 0.4);
 
 /// How far a place is in tissue, mm: a ball with furrows.
 fn tissue(p: Vec3) -> f32 {
@@ -35,7 +37,7 @@ fn brain() -> (TriMesh, Vec<f32>, [TetMesh; 2]) {
 
 fn frame<'a>() -> Frame<'a> {
     let slices = SliceLook { half_height_mm: Some(30.0), ..SliceLook::default() };
-    Frame { slices, ..Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.4), 110.0)) }
+    Frame { slices, ..Frame::of(Camera::viewed_from(Vec3::ZERO, EYE, 110.0)) }
 }
 
 /// Share of the pixels that differ by more than a tenth of white.
@@ -74,8 +76,10 @@ fn device_and_processor_draw_the_same_cortex_also_where_tetrahedra_are_gone() {
     let middle = |tet: &[u32; 4]| tet.iter().map(|n| mesh.positions[*n as usize]).sum::<Vec3>() / 4.0;
     let gone: Vec<bool> = mesh.tets.iter().map(|tet| middle(tet).distance(Vec3::new(16.0, 12.0, 6.0)) < 12.0).collect();
     let mut images = Vec::new();
-    for brain_gone in [None, Some(&gone[..]), None] {
-        let frame = Frame { brain_gone, ..frame() };
+    let cut = Some(Cut { point: 14.0 * EYE.normalize(), normal: EYE, bone: false });
+    for (brain_gone, cut) in [(None, None), (Some(&gone[..]), None), (None, None), (None, cut), (Some(&gone[..]), cut)]
+    {
+        let frame = Frame { brain_gone, cut, ..frame() };
         on_device.draw(&frame).expect("drawn");
         on_processor.draw(&frame).expect("drawn");
         let (device, processor) = (on_device.image().expect("picture"), on_processor.image());
@@ -84,4 +88,32 @@ fn device_and_processor_draw_the_same_cortex_also_where_tetrahedra_are_gone() {
     }
     assert_eq!(images[0], images[2], "what is back looks as before");
     assert!(apart(&images[0], &images[1]) > 0.03);
+    assert!(apart(&images[0], &images[3]) > 0.03);
+}
+
+#[test]
+fn a_section_shows_tissue_and_not_what_is_between_its_folds() {
+    let (surface, depth_mm, [mesh, _]) = brain();
+    let cortex = Some(Cortex { surface: &surface, depth_mm: &depth_mm });
+    let up = EYE.normalize();
+    let cut = Some(Cut { point: 20.0 * up, normal: EYE, bone: false });
+    // Without an MRI the section has one colour, which no lit surface has.
+    let flat = |image: &Image| {
+        let mut counts = std::collections::BTreeMap::new();
+        image.rgba.chunks(4).for_each(|pixel| *counts.entry(pixel.to_vec()).or_insert(0u32) += 1);
+        let red = counts.into_iter().filter(|(pixel, _)| pixel[0] > pixel[2]);
+        f64::from(red.map(|(_, count)| count).max().unwrap_or(0))
+    };
+    let [shown, whole] = [cortex, None].map(|cortex| {
+        let data = SceneData { brain: Some(&mesh), cortex, ..SceneData::default() };
+        let mut renderer = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
+        renderer.draw(&Frame { cut, ..frame() }).expect("drawn");
+        flat(renderer.image())
+    });
+    let (x, y) = up.any_orthonormal_pair();
+    let grid = || (0..160 * 160).map(|n| 0.2 * ((n % 160) as f32 - 79.5) * x + 0.2 * ((n / 160) as f32 - 79.5) * y);
+    let [tissue, ball] = [tissue as fn(Vec3) -> f32, |p: Vec3| 24.0 - p.length()]
+        .map(|of| grid().filter(|p| of(20.0 * up + *p) > 0.0).count() as f64);
+    assert!(tissue < 0.93 * ball, "the furrows are wide enough to be seen: {tissue} of {ball}");
+    assert!((shown / whole - tissue / ball).abs() < 0.03, "{shown} of {whole}, {tissue} of {ball}");
 }

@@ -3,7 +3,9 @@
 use super::enlarge::fill;
 use crate::RenderError;
 use crate::scene::Scene;
-use trepan_gpu::{Bindings, Buffer, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Texture, Topology};
+use trepan_gpu::{
+    Bindings, Buffer, DepthTest, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Texture, Topology,
+};
 
 /// The render pass.
 #[derive(Debug)]
@@ -18,7 +20,7 @@ impl Anaglyph {
             wgsl: trepan_shaders::RENDER_ANAGLYPH,
             slots: &[Slot::Uniform, Slot::Texture2, Slot::Texture2, Slot::Sampler],
             targets: &[Format::Rgba8Unorm],
-            depth: false,
+            depth: DepthTest::Off,
             blend: false,
             topology: Topology::Triangles,
         };

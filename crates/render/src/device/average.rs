@@ -9,7 +9,7 @@ use super::enlarge::{Enlarge, fill};
 use crate::RenderError;
 use crate::scene::Scene;
 use trepan_gpu::{
-    Bindings, Buffer, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Texture, TextureSpec, Topology,
+    Bindings, Buffer, DepthTest, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Texture, TextureSpec, Topology,
 };
 
 /// The render pass.
@@ -36,7 +36,7 @@ impl Average {
             wgsl: trepan_shaders::RENDER_AVERAGE,
             slots: &[Slot::Uniform, Slot::Texture2],
             targets: &[Format::Rgba16Float],
-            depth: false,
+            depth: DepthTest::Off,
             blend: true,
             topology: Topology::Triangles,
         };

@@ -8,7 +8,7 @@ use crate::border::Border;
 use crate::scene::Scene;
 use crate::{Cortex, Frame, RenderError};
 use glam::{Vec3, Vec4};
-use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
+use trepan_gpu::{Bindings, Buffer, DepthTest, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 use trepan_mesh::TetMesh;
 
 /// The brain's boundary on the device.
@@ -17,6 +17,8 @@ pub(crate) struct Brain {
     pub border: Border,
     device: Device,
     pipeline: Pipeline,
+    /// What turns its back, and its face, where a closed cortex is cut.
+    sides: [Pipeline; 2],
 }
 
 #[derive(Debug)]
@@ -51,19 +53,18 @@ impl Brain {
         let border = Border::of(mesh, cortex);
         let device = Device::of(gpu, &border)?;
         let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
-        let pipeline = Pipeline::new(
-            gpu,
-            &PipelineSpec {
-                label: "brain",
-                wgsl: trepan_shaders::RENDER_BRAIN,
-                slots: &slots,
-                targets: &[Format::Rgba32Uint, Format::Rgba32Uint],
-                depth: true,
-                blend: false,
-                topology: Topology::Triangles,
-            },
-        )?;
-        Ok(Self { border, device, pipeline })
+        let spec = PipelineSpec {
+            label: "brain",
+            wgsl: trepan_shaders::RENDER_BRAIN,
+            slots: &slots,
+            targets: &[Format::Rgba32Uint, Format::Rgba32Uint],
+            depth: DepthTest::Nearest,
+            blend: false,
+            topology: Topology::Triangles,
+        };
+        let side = |depth| Pipeline::new(gpu, &PipelineSpec { depth, ..spec });
+        let sides = [side(DepthTest::BackDepth)?, side(DepthTest::NearestFront)?];
+        Ok(Self { border, device, pipeline: Pipeline::new(gpu, &spec)?, sides })
     }
 
     /// Updates what is seen of the brain, and the dura over it, from a frame.
@@ -87,6 +88,13 @@ impl Brain {
         let vertices = [&d.places, &d.normals, &d.rest, &d.looks].map(Into::into);
         let [places, normals, rest, looks] = vertices;
         Ok(self.pipeline.bind(gpu, &[scene.into(), places, normals, rest, looks, (&d.corners).into()])?)
+    }
+
+    /// Draws a closed cortex over its cut: the cut stays where the inside would be seen.
+    pub fn draw_over_cut(&self, draws: &mut Draws, bindings: &Bindings) {
+        let own = 3 * self.border.own as u32;
+        self.sides.iter().for_each(|side| draws.draw(side, bindings, own));
+        self.draw(draws, bindings);
     }
 
     /// Draws the boundary triangles.

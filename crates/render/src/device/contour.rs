@@ -6,7 +6,8 @@ use crate::scene::Scene;
 use crate::slice::Plane;
 use glam::{Vec2, Vec3, Vec4};
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+    Bindings, Buffer, DepthTest, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture,
+    Topology,
 };
 
 /// Largest number of lines of one slice; a brain of 100,000 boundary triangles needs about 2,000.
@@ -29,7 +30,7 @@ impl Contour {
             wgsl: trepan_shaders::RENDER_CONTOUR,
             slots: &[Slot::Uniform, Slot::Uniform, Slot::Storage],
             targets: &[Format::Rgba8Unorm],
-            depth: false,
+            depth: DepthTest::Off,
             blend: true,
             topology: Topology::Lines,
         };

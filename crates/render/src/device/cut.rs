@@ -5,7 +5,7 @@ use crate::border::Border;
 use crate::scene::Scene;
 use crate::section;
 use glam::Vec4;
-use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
+use trepan_gpu::{Bindings, Buffer, DepthTest, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 
 /// Largest number of triangles of a cut; a brain of 100,000 tetrahedra needs about 8,000.
 const MOST_TRIANGLES: usize = 16_384;
@@ -14,6 +14,8 @@ const MOST_TRIANGLES: usize = 16_384;
 #[derive(Debug)]
 pub(crate) struct Face {
     pipeline: Pipeline,
+    /// The same below whatever is drawn later.
+    below: Pipeline,
     corners: Buffer<[Vec4; 2]>,
     cut: Vec<[Vec4; 2]>,
 }
@@ -25,12 +27,13 @@ impl Face {
             wgsl: trepan_shaders::RENDER_CUT,
             slots: &[Slot::Uniform, Slot::Storage],
             targets: &[Format::Rgba32Uint, Format::Rgba32Uint],
-            depth: true,
+            depth: DepthTest::Nearest,
             blend: false,
             topology: Topology::Triangles,
         };
         let corners = Buffer::zeroed(gpu, "cut", 3 * MOST_TRIANGLES)?;
-        Ok(Self { pipeline: Pipeline::new(gpu, &spec)?, corners, cut: Vec::new() })
+        let below = Pipeline::new(gpu, &PipelineSpec { depth: DepthTest::Ignored, ..spec })?;
+        Ok(Self { pipeline: Pipeline::new(gpu, &spec)?, below, corners, cut: Vec::new() })
     }
 
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
@@ -53,6 +56,16 @@ impl Face {
         }
         self.corners.write(gpu, 0, &self.cut);
         left
+    }
+
+    /// Whether nothing is cut.
+    pub fn is_empty(&self) -> bool {
+        self.cut.is_empty()
+    }
+
+    /// Draws the cut below all that is drawn later.
+    pub fn draw_below(&self, draws: &mut Draws, bindings: &Bindings) {
+        draws.draw(&self.below, bindings, self.cut.len() as u32);
     }
 
     /// Draws the cut together with the boundary triangles.

@@ -3,8 +3,8 @@
 use crate::RenderError;
 use crate::scene::Scene;
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
-    Topology,
+    Bindings, Buffer, DepthTest, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target,
+    Texture, Topology,
 };
 
 /// The render pass.
@@ -20,7 +20,7 @@ impl Enlarge {
             wgsl: trepan_shaders::RENDER_ENLARGE,
             slots: &[Slot::Uniform, Slot::Texture2, Slot::Sampler],
             targets: &[Format::Rgba8Unorm],
-            depth: false,
+            depth: DepthTest::Off,
             blend: false,
             topology: Topology::Triangles,
         };

@@ -124,8 +124,13 @@ impl EyeTextures {
         let colours = [&self.brain_hit, &self.brain_rest].map(|texture| Target { texture, clear: Some([0.0; 4]) });
         let target = DrawTarget { colours: &colours, depth: Some(Depth { texture: &self.depth, clear: Some(1.0) }) };
         recorder.draw("brain", &target, |draws| {
-            brain.draw(draws, border);
-            face.draw(draws, cut);
+            if brain.border.is_closed() && !face.is_empty() {
+                face.draw_below(draws, cut);
+                brain.draw_over_cut(draws, border);
+            } else {
+                brain.draw(draws, border);
+                face.draw(draws, cut);
+            }
         });
     }
 

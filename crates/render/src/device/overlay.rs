@@ -5,7 +5,8 @@ use crate::overlay::{Item, MOST_ITEMS, Overlay, items};
 use crate::scene::Scene;
 use glam::Vec3;
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+    Bindings, Buffer, DepthTest, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture,
+    Topology,
 };
 
 /// The render pass.
@@ -23,7 +24,7 @@ impl Shapes {
             wgsl: trepan_shaders::RENDER_OVERLAY,
             slots: &[Slot::Uniform, Slot::Storage, Slot::Integer2, Slot::Integer2],
             targets: &[Format::Rgba8Unorm],
-            depth: false,
+            depth: DepthTest::Off,
             blend: true,
             topology: Topology::Triangles,
         };

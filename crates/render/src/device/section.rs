@@ -7,7 +7,8 @@ use crate::section::triangles;
 use crate::slice::Plane;
 use glam::Vec4;
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+    Bindings, Buffer, DepthTest, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture,
+    Topology,
 };
 
 /// Largest number of triangles of one slice; a brain of 100,000 tetrahedra needs about 8,000.
@@ -30,7 +31,7 @@ impl Section {
             wgsl: trepan_shaders::RENDER_SECTION,
             slots: &[Slot::Uniform, Slot::Storage],
             targets: &[Format::Rgba32Uint],
-            depth: false,
+            depth: DepthTest::Off,
             blend: false,
             topology: Topology::Triangles,
         };

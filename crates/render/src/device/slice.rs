@@ -7,8 +7,8 @@ use crate::scene::Scene;
 use crate::slice::{LETTERS, Plane};
 use glam::Vec4;
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
-    Topology,
+    Bindings, Buffer, DepthTest, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target,
+    Texture, Topology,
 };
 
 /// Layout of the shader's `Slice`.
@@ -39,7 +39,7 @@ impl Slices {
             slots: &[&[Slot::Uniform, Slot::Uniform], &volumes[..], &[Slot::Integer2, Slot::Storage, Slot::Storage]]
                 .concat(),
             targets: &[Format::Rgba8Unorm],
-            depth: false,
+            depth: DepthTest::Off,
             blend: false,
             topology: Topology::Triangles,
         };

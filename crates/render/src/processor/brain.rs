@@ -36,10 +36,14 @@ pub(crate) struct Fragments {
 struct Meeting {
     /// One over its depth, 1/mm; 0 where none is.
     nearness: f32,
+    /// Its number, and [`BACK`] if it turns its back.
     triangle: u32,
     /// Weights of the second and the third corner.
     weights: [f32; 2],
 }
+
+/// The bit of what turns its back where a closed cortex is cut: the cut is seen there.
+const BACK: u32 = 1 << 31;
 
 const NOWHERE: Meeting = Meeting { nearness: 0.0, triangle: 0, weights: [0.0; 2] };
 
@@ -95,7 +99,7 @@ impl Fragments {
     /// What is seen at a pixel of the brain that was drawn last.
     pub fn at(&self, brain: Option<&Border>, pixel: usize) -> Fragment {
         let Meeting { nearness, triangle, weights: [v, w] } = self.nearest[pixel];
-        let Some(brain) = brain.filter(|_| nearness > 0.0) else { return NONE };
+        let Some(brain) = brain.filter(|_| nearness > 0.0 && triangle & BACK == 0) else { return NONE };
         let weights = [1.0 - v - w, v, w];
         let mean = |of: &[Vec3], corners: [u32; 3]| (0..3).map(|k| weights[k] * of[corners[k] as usize]).sum::<Vec3>();
         if let Some(at) = triangle.checked_sub(self.first_cut) {
@@ -154,17 +158,21 @@ impl Fragments {
             let seen = chunks.iter().filter(|(_, seen)| seen.start < end && start < seen.end);
             for n in seen.flat_map(|(chunk, _)| chunk.triangles.clone()) {
                 let corners = border.triangles[n].map(|n| n as usize);
-                // What turns its back is hidden by what is before it, unless something is cut away.
-                let one_sided = brain_cut == Vec4::ZERO && border.is_closed_at(n);
-                let n = n as u32;
-                band.triangle(n, corners.map(|n| &vertices[n]), one_sided, |weights| {
+                // What turns its back is hidden by what is before it, or shows that it was cut.
+                let side = match border.is_closed() && n < border.own {
+                    true if brain_cut == Vec4::ZERO => Side::Front,
+                    true => Side::Marked,
+                    false => Side::Both,
+                };
+                band.triangle(n as u32, corners.map(|n| &vertices[n]), side, |weights| {
                     let place = (0..3).map(|k| weights[k] * border.places[corners[k]]).sum();
                     brain_cut == Vec4::ZERO || height(brain_cut, place) <= 0.0
                 });
             }
             for (n, corners) in (self.first_cut..).zip(cut) {
                 let corners = corners.map(|corner| Vertex::seen(view, size, corner.place));
-                band.triangle(n, corners.each_ref(), false, |_| true);
+                let side = if border.is_closed() { Side::Cut } else { Side::Both };
+                band.triangle(n, corners.each_ref(), side, |_| true);
             }
         });
     }
@@ -182,6 +190,17 @@ fn bands(vertices: &[Vertex], height: usize, threads: usize) -> Vec<usize> {
     ends
 }
 
+/// Which side of a triangle is drawn, and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Side {
+    Both,
+    Front,
+    /// Both, the back with a mark.
+    Marked,
+    /// Both, where a marked back would be seen.
+    Cut,
+}
+
 /// Some rows of the picture.
 struct Band<'a> {
     width: usize,
@@ -192,12 +211,13 @@ struct Band<'a> {
 impl Band<'_> {
     /// Draws a triangle where it is the nearest so far and `is_left`, by the weights of its
     /// corners.
-    fn triangle(&mut self, number: u32, corners: [&Vertex; 3], one_sided: bool, is_left: impl Fn([f32; 3]) -> bool) {
+    fn triangle(&mut self, number: u32, corners: [&Vertex; 3], side: Side, is_left: impl Fn([f32; 3]) -> bool) {
         let [a, b, c] = corners.map(|v| v.at);
         let double_area = (b - a).perp_dot(c - a);
         // Pictures have y downwards: what faces the eye is clockwise. Degenerate triangles and
         // those with a non-finite position are skipped.
-        if one_sided && double_area > 0.0 || double_area == 0.0 || !double_area.is_finite() {
+        let is_back = double_area > 0.0;
+        if is_back && side == Side::Front || double_area == 0.0 || !double_area.is_finite() {
             return;
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
@@ -218,12 +238,17 @@ impl Band<'_> {
                 let over = [0, 1, 2].map(|n| flat[n] * corners[n].nearness);
                 let nearness = over.iter().sum::<f32>();
                 let nearest = &mut self.nearest[x + self.width * (y - self.rows.start)];
-                if nearness <= nearest.nearness {
+                let is_hidden = match side {
+                    Side::Cut => nearest.triangle & BACK == 0 || nearest.nearness <= 0.0,
+                    _ => nearness <= nearest.nearness,
+                };
+                if is_hidden {
                     continue;
                 }
                 let weights = over.map(|over| over / nearness);
                 if is_left(weights) {
-                    *nearest = Meeting { nearness, triangle: number, weights: [weights[1], weights[2]] };
+                    let mark = if is_back && side == Side::Marked { BACK } else { 0 };
+                    *nearest = Meeting { nearness, triangle: number | mark, weights: [weights[1], weights[2]] };
                 }
             }
         }
