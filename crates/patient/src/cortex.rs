@@ -11,7 +11,7 @@
 //! left out. An MRI in which the mask holds little over that level, as a T2, gives the mask alone.
 //!
 //! # When not to use it
-//! To compute with: sheets may touch. Tetrahedra come from [`make_brain`](crate::anatomy).
+//! To compute with: sheets may touch. For that there are tetrahedra.
 
 use rayon::prelude::*;
 use trepan_geometry::Vec3;
