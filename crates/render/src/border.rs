@@ -6,7 +6,7 @@
 
 use crate::chunks::{self, Chunk, MANY};
 use crate::cut::height;
-use crate::embedding::{Embedding, NO_TET, embeddings};
+use crate::embedding::{Embedding, embeddings};
 use crate::frame::Cortex;
 use crate::touch::touch;
 use crate::{Leaves, RenderError};
@@ -49,8 +49,6 @@ pub(crate) struct Border {
     pub stains: Vec<f32>,
     /// Ways to vessels at each vertex, and the light of the surroundings there, 0 to 1.
     pub looks: Vec<Vec4>,
-    /// Light of the surroundings that reaches each of the brain's vertices, 0 to 1.
-    open: Vec<f32>,
     /// The brain's own triangles, before those of the dura.
     pub own: usize,
     /// Vertices of the dura, after the brain's.
@@ -61,11 +59,12 @@ pub(crate) struct Border {
 #[derive(Debug)]
 struct Whole {
     tets: Vec<[u32; 4]>,
-    /// Faces of the boundary; empty without a cortex.
+    /// Faces of the boundary, and the same in order; empty without a cortex.
     faces: Vec<[u32; 3]>,
+    known: BTreeSet<[u32; 3]>,
     embeddings: Vec<Embedding>,
     triangles: Vec<[u32; 3]>,
-    open: Vec<f32>,
+    looks: Vec<Vec4>,
 }
 
 /// Stain of the dura.
@@ -75,7 +74,7 @@ const DARK_MM: f32 = 3.5;
 /// Light of the surroundings deep in a sulcus, numerical.
 const DARKEST: f32 = 0.25;
 
-/// Look of what bears no vessels.
+/// Look of what bears no vessels; that of walls has more light.
 const BARE: Vec4 = Vec4::new(1.0, 1.0, 1.0, PIA);
 /// Light of the surroundings that reaches what lies open under its pia; bare tissue has more.
 pub(crate) const PIA: f32 = 0.99;
@@ -121,17 +120,23 @@ impl Whole {
         let surface = Surface::of(mesh);
         let tets = mesh.tets.clone();
         if let Some(Cortex { surface: fine, depth_mm }) = cortex {
-            let open = |mm: &f32| DARKEST + (PIA - DARKEST) * (-mm / DARK_MM).exp();
-            let mut open: Vec<f32> = depth_mm.iter().map(open).collect();
-            open.resize(fine.positions.len(), PIA);
-            let embeddings = embeddings(mesh, &fine.positions);
             let mut triangles = fine.triangles.clone();
             chunks::sort(&mut triangles, &fine.positions);
-            return Self { tets, faces: surface.triangles, embeddings, triangles, open };
+            let mut normals = vec![Vec3::ZERO; fine.positions.len()];
+            smooth_normals(&fine.positions, &triangles, &mut normals);
+            let look = |(n, (place, normal)): (usize, (&Vec3, &Vec3))| {
+                let depth_mm = depth_mm.get(n).copied().unwrap_or_default();
+                let open = DARKEST + (PIA - DARKEST) * (-depth_mm / DARK_MM).exp();
+                vessels(*place, normal.normalize_or(Vec3::Z)).extend(open)
+            };
+            let looks = fine.positions.iter().zip(&normals).enumerate().map(look).collect();
+            let known = surface.triangles.iter().copied().map(sorted).collect();
+            let embeddings = embeddings(mesh, &fine.positions);
+            return Self { tets, faces: surface.triangles, known, embeddings, triangles, looks };
         }
         let (embeddings, triangles) = on_nodes(&surface.triangles);
-        let open = vec![PIA; embeddings.len()];
-        Self { tets, faces: Vec::new(), embeddings, triangles, open }
+        let looks = vec![BARE; embeddings.len()];
+        Self { tets, faces: Vec::new(), known: BTreeSet::new(), embeddings, triangles, looks }
     }
 }
 
@@ -157,8 +162,7 @@ impl Border {
             triangles: whole.triangles.clone(),
             chunks: Vec::new(),
             moved_mm: 0.0,
-            open: whole.open.clone(),
-            looks: Vec::new(),
+            looks: whole.looks.clone(),
             faces: whole.faces.clone(),
             whole,
             tets,
@@ -181,15 +185,6 @@ impl Border {
         self.places = self.embeddings.iter().map(|embedding| embedding.place(&self.now)).collect();
         self.normals = vec![Vec3::ZERO; self.embeddings.len()];
         self.stains = vec![0.0; self.embeddings.len()];
-        let has_vessels = !self.faces.is_empty();
-        self.looks = vec![BARE; self.embeddings.len()];
-        if has_vessels {
-            smooth_normals(&self.at_rest, &self.triangles, &mut self.normals);
-            let vertices = self.at_rest.par_iter().zip(&self.normals).zip(&self.open);
-            let looks =
-                vertices.map(|((rest, normal), open)| vessels(*rest, normal.normalize_or(Vec3::Z)).extend(*open));
-            looks.collect_into_vec(&mut self.looks);
-        }
         (self.own, self.leaves) = (self.triangles.len(), 0);
         self.chunks = Chunk::all(&self.triangles, &self.at_rest);
     }
@@ -211,11 +206,10 @@ impl Border {
         (self.rest, self.tets) = (mesh.positions, mesh.tets);
         if whole.faces.is_empty() {
             (self.embeddings, self.triangles) = on_nodes(&bared);
-            self.open = vec![PIA; self.embeddings.len()];
+            self.looks = vec![BARE; self.embeddings.len()];
         } else {
             self.faces.clone_from(&bared);
-            let before: BTreeSet<_> = whole.faces.iter().copied().map(sorted).collect();
-            bared.retain(|face| !before.contains(&sorted(*face)));
+            bared.retain(|face| !whole.known.contains(&sorted(*face)));
             let (walls, faces) = on_nodes(&bared);
             // What straddles the edge stays: it covers the gap to the wall.
             let stays = |corners: &&[u32; 3]| corners.iter().any(|n| !is_gone(whole.embeddings[*n as usize].tet));
@@ -223,8 +217,8 @@ impl Border {
             self.triangles = whole.triangles.iter().filter(stays).copied().collect();
             self.triangles.extend(faces.into_iter().map(|corners| corners.map(|n| n + first)));
             self.embeddings = [&whole.embeddings[..], &walls[..]].concat();
-            self.open.clone_from(&whole.open);
-            self.open.resize(self.embeddings.len(), 1.0);
+            self.looks.clone_from(&whole.looks);
+            self.looks.resize(self.embeddings.len(), Vec4::ONE);
         }
         self.shown();
         true
@@ -283,18 +277,9 @@ impl Border {
         let mm = |stain: u8| if stain == u8::MAX { -1.0 } else { 0.01 * f32::from(stain) };
         let of = |node: u32| stains.and_then(|all| all.get(node as usize)).map_or(0.0, |stain| mm(*stain));
         for (stain, embedding) in self.stains.iter_mut().zip(&self.embeddings) {
-            *stain = match (stains, embedding.tet) {
-                (None, _) => 0.0,
-                (_, NO_TET) => of(embedding.nodes[0]),
-                // That of the nearest node which has one: inner nodes have none.
-                _ => {
-                    let near = (0..4).filter(|k| of(embedding.nodes[*k]) != 0.0 && embedding.weights[*k] > 0.0);
-                    let (sum, all) = near.fold((0.0, 0.0), |(sum, all), k| {
-                        (sum + embedding.weights[k] * of(embedding.nodes[k]), all + embedding.weights[k])
-                    });
-                    if all > 0.0 { sum / all * all.min(1.0) } else { 0.0 }
-                }
-            };
+            let weights = embedding.weights.map(|weight| weight.max(0.0));
+            let sum: f32 = (0..4).map(|k| weights[k] * of(embedding.nodes[k])).sum();
+            *stain = if stains.is_some() { sum / weights.iter().sum::<f32>().max(1.0) } else { 0.0 };
         }
     }
 

@@ -13,7 +13,7 @@
 
 use glam::{IVec3, Mat3, Vec3};
 use trepan_geometry::Aabb;
-use trepan_mesh::TetMesh;
+use trepan_mesh::{NONE, TetMesh};
 
 /// A vertex as a weighted sum of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,17 +22,14 @@ pub(crate) struct Embedding {
     pub weights: [f32; 4],
     /// Added to that sum, mm.
     pub offset: Vec3,
-    /// The tetrahedron, or [`NO_TET`] for a node.
+    /// The tetrahedron, or [`NONE`] for a node.
     pub tet: u32,
 }
-
-/// The tetrahedron of a embedding that is a node.
-pub(crate) const NO_TET: u32 = u32::MAX;
 
 impl Embedding {
     /// A node itself.
     pub fn node(node: u32) -> Self {
-        Self { nodes: [node; 4], weights: [1.0, 0.0, 0.0, 0.0], offset: Vec3::ZERO, tet: NO_TET }
+        Self { nodes: [node; 4], weights: [1.0, 0.0, 0.0, 0.0], offset: Vec3::ZERO, tet: NONE }
     }
 
     /// Its place, by the places of all nodes.
@@ -42,6 +39,9 @@ impl Embedding {
         u * a + v * b + w * c + x * d + self.offset
     }
 }
+
+/// Cells along an axis at most, numerical.
+const MOST_CELLS: f32 = 200.0;
 
 /// Tetrahedra by the cells of a grid that they reach.
 struct Cells {
@@ -57,8 +57,9 @@ impl Cells {
     fn of(mesh: &TetMesh) -> Self {
         let boxes = || mesh.tets.iter().map(|tet| Aabb::of_points(&tet.map(|n| mesh.positions[n as usize])));
         let sum: f32 = boxes().map(|b| b.size().max_element()).filter(|mm| mm.is_finite()).sum();
-        let edge_mm = (sum / mesh.tets.len().max(1) as f32).max(1e-3);
         let all = mesh.bounds();
+        let mean_mm = sum / mesh.tets.len().max(1) as f32;
+        let edge_mm = mean_mm.max(all.size().max_element() / MOST_CELLS).max(1e-3);
         let (origin, dims) = (all.min - edge_mm, (all.size() / edge_mm).ceil().as_ivec3() + 2);
         let mut cells = Self { origin, edge_mm, dims, first: Vec::new(), tets: Vec::new() };
         // Half a cell of room, for what lies just outside.
@@ -93,7 +94,7 @@ impl Cells {
 /// Weight of a corner beyond which a vertex is too far outside its tetrahedron, numerical.
 const LEAST_WEIGHT: f32 = -2.0;
 
-/// A embedding for each place, in a mesh at rest; what is too far from it keeps its distance to the
+/// An embedding for each place, in a mesh at rest; what is too far from it keeps its way from the
 /// nearest node.
 pub(crate) fn embeddings(mesh: &TetMesh, places: &[Vec3]) -> Vec<Embedding> {
     use rayon::prelude::*;

@@ -66,10 +66,18 @@ fn judge(head: &BaseHead, scope: Scope, findings: &mut Findings) {
     for (with, cortex) in [("with_ms", cortex), ("without_ms", None)] {
         let mut drawn = View::of(&meshes[1], cortex, middle);
         let sways: Vec<Vec<Vec3>> = (0..4).map(|turn| swaying(&meshes[1], turn)).collect();
-        drawn.draw(1, Some(&sways[1]));
-        let times = Samples::of(scope.pick(4, 20), |turn| drawn.draw(turn, Some(&sways[turn % 4])));
+        drawn.draw(1, Some(&sways[1]), None);
+        let times = Samples::of(scope.pick(4, 20), |turn| drawn.draw(turn, Some(&sways[turn % 4]), None));
         row = row.metric(with, 1e-3 * times.quantile(0.5));
     }
+    // One more tetrahedron is gone in each picture.
+    let mut drawn = View::of(&meshes[1], cortex, middle);
+    let mut gone = vec![false; meshes[1].tets.len()];
+    let times = Samples::of(scope.pick(4, 20), |turn| {
+        gone[turn] = true;
+        drawn.draw(turn, None, Some(&gone));
+    });
+    row = row.metric("resected_ms", 1e-3 * times.quantile(0.5));
     findings.rows.push(row);
     findings.gates.extend([
         Gate::at_most(format!("{name}: cortex against the MRI's isosurface, p95 mm"), p95_mm, 0.5),
@@ -90,16 +98,16 @@ impl View {
         Self { renderer, middle }
     }
 
-    fn draw(&mut self, turn: usize, brain_positions: Option<&[Vec3]>) {
+    fn draw(&mut self, turn: usize, brain_positions: Option<&[Vec3]>, brain_gone: Option<&[bool]>) {
         let towards = Vec3::new(0.5 + 0.02 * (turn % 2) as f32, 1.0, 0.45);
         let camera = Camera::viewed_from(self.middle, towards, 300.0);
         let slices = SliceLook { shown: false, ..SliceLook::default() };
-        self.renderer.draw(&Frame { brain_positions, slices, ..Frame::of(camera) }).expect("drawn");
+        self.renderer.draw(&Frame { brain_positions, brain_gone, slices, ..Frame::of(camera) }).expect("drawn");
     }
 
     /// Whether each pixel shows the brain, at rest.
     fn outline(&mut self) -> Vec<bool> {
-        self.draw(0, None);
+        self.draw(0, None, None);
         let Image { rgba, .. } = self.renderer.image();
         // The background is blue, the brain is red.
         rgba.chunks(4).map(|pixel| pixel[0] > pixel[2]).collect()
