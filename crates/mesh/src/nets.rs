@@ -123,8 +123,9 @@ impl TriMesh {
         made
     }
 
-    /// The part with the most triangles among those that share no vertex, such as a cortex without
-    /// its ventricles.
+    /// The part around the largest volume, such as a cortex without its ventricles.
+    ///
+    /// Parts share no vertex; the volume of a hollow counts as less than nothing.
     pub fn largest_part(&self) -> Self {
         let mut root: Vec<u32> = (0..self.positions.len() as u32).collect();
         fn find(root: &mut [u32], mut n: u32) -> u32 {
@@ -139,9 +140,13 @@ impl TriMesh {
             let least = a.min(b).min(c);
             [a, b, c].into_iter().for_each(|n| root[n as usize] = least);
         }
-        let mut triangles = vec![0u32; root.len()];
-        self.triangles.iter().for_each(|corners| triangles[find(&mut root, corners[0]) as usize] += 1);
-        let largest = (0..root.len()).max_by_key(|n| (triangles[*n], std::cmp::Reverse(*n))).unwrap_or(0) as u32;
+        // Six times the volume inside each part; that of a hollow is negative.
+        let mut inside = vec![0.0f64; root.len()];
+        for (t, corners) in self.triangles.iter().enumerate() {
+            let [a, b, c] = self.corners(t).map(|p| (p - self.positions[0]).as_dvec3());
+            inside[find(&mut root, corners[0]) as usize] += a.dot(b.cross(c));
+        }
+        let largest = (0..root.len()).max_by(|a, b| inside[*a].total_cmp(&inside[*b])).unwrap_or(0) as u32;
         let mut new_index = vec![u32::MAX; root.len()];
         let mut part = Self::default();
         for corners in &self.triangles {
@@ -193,6 +198,20 @@ mod tests {
         assert!(fewer.is_closed() && 3 * fewer.triangles.len() < mesh.triangles.len());
         assert!((fewer.volume_mm3() / mesh.volume_mm3() - 1.0).abs() < 0.09, "{}", fewer.volume_mm3());
         assert_eq!(mesh.clustered(3.0, 1.1).triangles.len(), mesh.triangles.len(), "nothing is that flat");
+    }
+
+    #[test]
+    fn of_a_ball_with_a_large_hollow_the_outside_stays() {
+        let middle = Vec3::new(21.0, 14.0, 10.0);
+        let mut shell = balls(0.8, &[(middle, 11.0)]);
+        for at in 0..shell.data.len() {
+            let place = shell.centre_of([at % 40, at / 40 % 30, at / 1200]).as_vec3();
+            // The hollow's surface has folds, and so more triangles than the outside.
+            let hollow = 7.5 + 1.5 * (2.0 * place.x).sin() - place.distance(middle);
+            shell.data[at] = shell.data[at].min(-hollow);
+        }
+        let part = surface_nets(&shell, 0.0).largest_part();
+        assert!(part.volume_mm3() > 5000.0 && part.positions.iter().all(|p| p.distance(middle) > 10.5));
     }
 
     #[test]
