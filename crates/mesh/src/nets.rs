@@ -8,8 +8,8 @@
 //! sliver.
 //!
 //! # Practice
-//! World mm, in the order of the cells; equal volumes give bit-identical results. Some 30 ns a
-//! voxel; 4 bytes a voxel meanwhile.
+//! World mm, in the order of the cells; equal volumes give bit-identical results. Linear in
+//! voxels; 4 bytes a voxel meanwhile.
 //!
 //! # Sources
 //! S. F. F. Gibson, *Constrained elastic surface nets*, MICCAI 1998.
@@ -92,7 +92,7 @@ impl TriMesh {
     /// The same surface with fewer triangles: vertices in a cube of an edge, mm, become their mean.
     ///
     /// Only where their normals are within an angle, by its cosine, of the normals' mean (after
-    /// Rossignac and Borrel 1993). Some 0.3 us a vertex.
+    /// Rossignac and Borrel 1993).
     pub fn clustered(&self, edge_mm: f32, cosine: f32) -> Self {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
         for (t, corners) in self.triangles.iter().enumerate() {

@@ -93,7 +93,7 @@ impl Scene {
 }
 
 impl RestBrain {
-    /// The cortex as the MRI shows it; 30 ns for each voxel around the brain.
+    /// The cortex as the MRI shows it; 0.7 s for the built-in head.
     pub fn cortex(&self) -> Cortex {
         Cortex::of(&self.mri, &self.classes, &self.field)
     }

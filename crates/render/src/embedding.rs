@@ -6,7 +6,7 @@
 //! of, relative to that one's size: some weights are negative then.
 //!
 //! # Practice
-//! Tetrahedra are found by a grid of cells of their mean size: some 3 us a vertex, once.
+//! Tetrahedra are found by a grid of cells of their mean size, once for a scene.
 //!
 //! # Sources
 //! As in the mappings of SOFA (Faure et al. 2012).

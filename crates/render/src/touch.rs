@@ -3,7 +3,8 @@
 //! # Practice
 //! Contact is with the boundary of the tetrahedra, which closes the sulci, as does the arachnoid.
 //! Where a tool touches it, the cortex beside the tool is drawn onto it, and less so further away:
-//! no tool floats over a sulcus or sinks in. Costs 20 ns for each face and vertex near the tool.
+//! no tool floats over a sulcus or sinks in. Costs a closest point for each pair of face and vertex
+//! near the tool.
 
 use glam::Vec3;
 use trepan_geometry::{Aabb, closest_weights};
