@@ -38,7 +38,7 @@ fn main() {
                 now_ms += 1.0;
                 let at = pair[0].lerp(pair[1], f32::from(part) / 500.0);
                 let began = Instant::now();
-                most_n = most_n.max(dura.step(now_ms, Some(Tip { at, radius_mm: 0.5, cuts })).length());
+                most_n = most_n.max(dura.step(now_ms, [Some(Tip { at, radius_mm: 0.5, cuts }), None])[0].length());
                 let us = began.elapsed().as_secs_f64() * 1e6;
                 (all_us, worst_us, steps) = (all_us + us, worst_us.max(us), steps + 1);
             }

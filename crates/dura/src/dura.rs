@@ -16,6 +16,7 @@ use crate::blade::Blade;
 use crate::membrane::Law;
 use crate::over::Grid;
 use crate::sheet::{NONE, Node, Point, Sheet};
+use crate::touch_force::TouchForce;
 use std::ops::Range;
 use trepan_geometry::{Vec3, closest_weights};
 use trepan_measurements::{brain_membranes, dura, pulse};
@@ -41,10 +42,6 @@ const REACH_MM: f32 = 7.0;
 const BELOW: f32 = 2e-3;
 /// Way of the brain below that moves the sheet, and one that sutures hold, mm, numerical.
 const STIRS_MM: [f32; 2] = [0.05, 0.3];
-/// Change of the force where another triangle is met, N, from which on it is faded in, numerical.
-const JUMP_N: f32 = 0.02;
-/// Time over which it is faded in, ms, numerical.
-const EASES_MS: f64 = 40.0;
 /// Time for which the sheet moves on after the last touch, ms, numerical.
 const AWAKE_MS: f64 = 500.0;
 /// Time in which the tension goes once the sheet is open, ms, numerical.
@@ -99,12 +96,7 @@ pub struct Dura {
     /// Time that no step has taken yet, ms.
     left_ms: f64,
     awake_ms: f64,
-    touched: bool,
-    /// The triangle that the tool met last, its force there, N, and the changes until then.
-    met: (Option<u32>, Vec3, u32),
-    /// The force when the triangle changed, N, and its share, which fades.
-    held: (Vec3, f32),
-    force: Vec3,
+    forces: [TouchForce; 2],
     held_ms: Option<f64>,
     blade: Blade,
     account: Account,
@@ -142,10 +134,7 @@ impl Dura {
             now_ms: f64::NAN,
             left_ms: 0.0,
             awake_ms: f64::NEG_INFINITY,
-            touched: false,
-            met: (None, Vec3::ZERO, 0),
-            held: (Vec3::ZERO, 0.0),
-            force: Vec3::ZERO,
+            forces: [TouchForce::default(); 2],
             held_ms: None,
             blade: Blade::default(),
             account: Account::default(),
@@ -231,7 +220,7 @@ impl Dura {
 
     /// Force on the tool in the last step, N.
     pub fn force(&self) -> Vec3 {
-        self.force
+        self.forces[0].force
     }
 
     /// Lets bone hold some nodes, by the place of each at rest, world mm, and the outward
@@ -324,48 +313,44 @@ impl Dura {
         Some(())
     }
 
-    /// Goes on to a time, ms; returns the force on the tool, N. Costs 25 ns for each free triangle
-    /// and 0.1 ms while anything moves.
-    pub fn step(&mut self, now_ms: f64, tip: Option<Tip>) -> Vec3 {
+    /// Goes on to a time, ms, with the tips of two tools, of which the first may cut.
+    ///
+    /// Returns the forces on them, N. Costs 25 ns for each free triangle and 0.1 ms while anything
+    /// moves.
+    pub fn step(&mut self, now_ms: f64, tips: [Option<Tip>; 2]) -> [Vec3; 2] {
         let before_ms = std::mem::replace(&mut self.now_ms, now_ms);
         let passed_ms = if before_ms.is_nan() { 0.0 } else { (now_ms - before_ms).clamp(0.0, LONGEST_MS) };
-        let touch = tip.filter(|tip| tip.at.is_finite()).and_then(|tip| self.find(&tip));
-        if touch.is_some() {
+        let touches = [0, 1].map(|hand| {
+            let touch = tips[hand].filter(|tip| tip.at.is_finite()).and_then(|tip| self.find(hand, &tip));
+            self.forces[hand].touched = touch.is_some();
+            touch
+        });
+        if self.forces.iter().any(|on_tool| on_tool.touched) {
             self.awake_ms = now_ms + AWAKE_MS;
         }
         if now_ms > self.awake_ms {
-            (self.force, self.held.1, self.left_ms) = (Vec3::ZERO, 0.0, 0.0);
-            return Vec3::ZERO;
+            self.forces.iter_mut().for_each(TouchForce::sleep);
+            self.left_ms = 0.0;
+            return [Vec3::ZERO; 2];
         }
         self.left_ms += passed_ms;
-        let (mut sum, mut steps, mut worst) = (Vec3::ZERO, 0.0f32, (self.law.tears_at, None));
+        let (mut sums, mut steps, mut worst) = ([Vec3::ZERO; 2], 0.0f32, (self.law.tears_at, None));
         while self.left_ms >= DT_MS {
             self.left_ms -= DT_MS;
             steps += 1.0;
-            sum += self.advance(touch.as_ref(), &mut worst);
+            self.advance(&touches, &mut sums, &mut worst);
         }
-        let now = if steps > 0.0 { sum / steps } else { self.met.1 };
-        self.feel(touch.map(|touch| touch.at.triangle), now, passed_ms);
+        for ((on_tool, touch), sum) in self.forces.iter_mut().zip(&touches).zip(sums) {
+            let mean = (steps > 0.0).then(|| sum / steps);
+            on_tool.feel(touch.map(|touch| touch.at.triangle), mean, self.changes, passed_ms);
+        }
         self.turn_normals();
-        let through = touch.filter(|touch| touch.depth_mm > DEPTHS_MM[1]).map(|touch| touch.at.triangle);
-        match worst.1.or(through) {
+        let through = touches.iter().flatten().find(|touch| touch.depth_mm > DEPTHS_MM[1]);
+        match worst.1.or(through.map(|touch| touch.at.triangle)) {
             Some(triangle) => self.tear(triangle),
-            None => self.incise(touch.as_ref(), tip.is_some_and(|tip| tip.cuts)),
+            None => self.incise(touches[0].as_ref(), tips[0].is_some_and(|tip| tip.cuts)),
         }
-        self.force
-    }
-
-    /// Takes the force of a touch so that the hand feels no jump where another triangle is met.
-    fn feel(&mut self, triangle: Option<u32>, now: Vec3, passed_ms: f64) {
-        let now = if triangle.is_some() { now } else { Vec3::ZERO };
-        // A cut turns the sheet under the blade.
-        let is_other = (triangle, self.changes) != (self.met.0, self.met.2);
-        if is_other && self.force.distance(now) > JUMP_N {
-            self.held = (self.force, 1.0);
-        }
-        self.met = (triangle, now, self.changes);
-        self.held.1 *= (-passed_ms / EASES_MS).exp() as f32;
-        self.force = now.lerp(self.held.0, self.held.1);
+        self.forces.map(|on_tool| on_tool.force)
     }
 
     fn tear(&mut self, triangle: u32) {
@@ -378,7 +363,7 @@ impl Dura {
     /// Cuts on to where a blade touches. The first edge takes a force: the sheet is taut. Later it
     /// is slack, and cut where the blade touches it, as with scissors.
     fn incise(&mut self, touch: Option<&Touch>, cuts: bool) {
-        let pierces = self.account.incised_mm > 0.0 || self.force.length() >= dura::INCISION_FORCE.f32();
+        let pierces = self.account.incised_mm > 0.0 || self.forces[0].force.length() >= dura::INCISION_FORCE.f32();
         let work = match touch {
             _ if !cuts => self.blade.lift(&mut self.sheet, self.edge_mm),
             Some(touch) if pierces => self.blade.follow(&mut self.sheet, self.edge_mm, &touch.at),
@@ -403,7 +388,7 @@ impl Dura {
         self.awake_ms = self.awake_ms.max(self.now_ms + AWAKE_MS);
         let Sheet { nodes, triangles, .. } = &mut self.sheet;
         let share = 0.25 * SAFETY * (DT_MS * DT_MS) as f32;
-        nodes.iter_mut().for_each(|node| (node.mass, node.below) = (share * (TOUCH + SUTURE), 0.0));
+        nodes.iter_mut().for_each(|node| (node.mass, node.below) = (share * (2.0 * TOUCH + SUTURE), 0.0));
         self.active.clear();
         for (t, triangle) in triangles.iter().enumerate().filter(|(_, triangle)| triangle.live) {
             let mass = share * triangle.shape.stiffest(&self.law);
@@ -434,8 +419,8 @@ impl Dura {
         worst
     }
 
-    /// One step; returns the force on the tool.
-    fn advance(&mut self, touch: Option<&Touch>, worst: &mut (f32, Option<u32>)) -> Vec3 {
+    /// One step; adds the forces on the tools.
+    fn advance(&mut self, touches: &[Option<Touch>; 2], sums: &mut [Vec3; 2], worst: &mut (f32, Option<u32>)) {
         let (dt, now_ms) = (DT_MS as f32, self.now_ms);
         let since =
             |ms: Option<f64>, over_ms: f64| ms.map_or(0.0, |ms| ((now_ms - ms) / over_ms).clamp(0.0, 1.0) as f32);
@@ -451,12 +436,13 @@ impl Dura {
         if strained.0 > worst.0 {
             *worst = strained;
         }
-        let mut on_tool = Vec3::ZERO;
-        if let Some(touch) = touch {
+        for (touch, sum) in touches.iter().zip(sums) {
+            let Some(touch) = touch else { continue };
             let corners = self.sheet.triangles[touch.at.triangle as usize].corners;
             let at: Vec3 = (0..3).map(|k| touch.at.weights[k] * self.sheet.nodes[corners[k] as usize].place).sum();
             let depth_mm = touch.tip.radius_mm - (touch.tip.at - self.middle - at).dot(touch.direction);
-            on_tool = TOUCH * depth_mm.max(0.0) * touch.direction;
+            let on_tool = TOUCH * depth_mm.max(0.0) * touch.direction;
+            *sum += on_tool;
             for (corner, weight) in corners.into_iter().zip(touch.at.weights) {
                 self.sheet.nodes[corner as usize].force -= weight * on_tool;
             }
@@ -465,11 +451,10 @@ impl Dura {
             node.velocity = (node.velocity + dt / node.mass * node.force) / (1.0 + DAMPING * dt);
             node.place += dt * node.velocity;
         }
-        on_tool
     }
 
-    /// Finds where a tool meets the sheet, and follows from which side.
-    fn find(&mut self, tip: &Tip) -> Option<Touch> {
+    /// Finds where a hand's tool meets the sheet, and follows from which side.
+    fn find(&self, hand: usize, tip: &Tip) -> Option<Touch> {
         let at = tip.at - self.middle;
         let far_mm = tip.radius_mm + REACH_MM + 2.0 * self.edge_mm;
         let mut best: Option<(f32, u32, [f32; 3], Vec3)> = None;
@@ -495,10 +480,8 @@ impl Dura {
             (!is_edge || !tip.cuts).then_some(Touch { at, direction, tip: *tip, depth_mm })
         });
         // A blade that is in an incision meets its end from the side.
-        let most_mm = if self.touched || tip.cuts { f32::INFINITY } else { DEPTHS_MM[0] };
-        let touch = found.filter(|touch| touch.depth_mm > 0.0 && touch.depth_mm < most_mm);
-        self.touched = touch.is_some();
-        touch
+        let most_mm = if self.forces[hand].touched || tip.cuts { f32::INFINITY } else { DEPTHS_MM[0] };
+        found.filter(|touch| touch.depth_mm > 0.0 && touch.depth_mm < most_mm)
     }
 
     /// Whether a point of a triangle is on an edge that joins nothing.
@@ -557,7 +540,7 @@ mod tests {
         for step in 1..=2 * ms {
             let at = a.lerp(b, (step as f32 / ms as f32).min(1.0));
             let tip = Tip { at, radius_mm: 0.4, cuts };
-            most_n = most_n.max(dura.step(from_ms + f64::from(step), Some(tip)).length());
+            most_n = most_n.max(dura.step(from_ms + f64::from(step), [Some(tip), None])[0].length());
         }
         most_n
     }
@@ -592,9 +575,9 @@ mod tests {
             })
             .collect();
         dura.sheet.nodes.iter_mut().zip(areas).for_each(|(node, area)| node.support = pressure * area * Vec3::Z);
-        dura.step(0.0, None);
+        dura.step(0.0, [None; 2]);
         dura.changed();
-        (1..400).for_each(|ms| _ = dura.step(f64::from(ms), None));
+        (1..400).for_each(|ms| _ = dura.step(f64::from(ms), [None; 2]));
         let theory_mm = 0.653 * RADIUS_MM * (pressure * RADIUS_MM / 40.0).cbrt();
         let mm = dura.sheet.nodes[0].place.z;
         assert!((mm / theory_mm - 1.0).abs() < 0.04, "{mm} mm against {theory_mm}");
@@ -603,11 +586,11 @@ mod tests {
     #[test]
     fn a_closed_sheet_stays_and_what_touches_nothing_costs_nothing() {
         let mut dura = disc(Law { strain: 1e-3, ..LAW }, 6);
-        (0..2000).for_each(|ms| _ = dura.step(f64::from(ms), None));
+        (0..2000).for_each(|ms| _ = dura.step(f64::from(ms), [None; 2]));
         assert!(dura.places().zip(&dura.sheet.nodes).all(|(place, node)| place.distance(node.rest) < 1e-4));
         let below = Tip { at: Vec3::Z * -3.0, radius_mm: 1.0, cuts: false };
-        assert_eq!(dura.step(2001.0, Some(below)), Vec3::ZERO, "it did not come from above");
-        assert_eq!(dura.step(2002.0, Some(Tip { at: Vec3::NAN, ..below })), Vec3::ZERO);
+        assert_eq!(dura.step(2001.0, [Some(below), None]), [Vec3::ZERO; 2], "it did not come from above");
+        assert_eq!(dura.step(2002.0, [Some(Tip { at: Vec3::NAN, ..below }), None]), [Vec3::ZERO; 2]);
     }
 
     /// Two incisions make a cross; its leaves are held back.
@@ -644,7 +627,7 @@ mod tests {
         dura.hold_back();
         let (from_ms, again) = (dura.now_ms, run());
         assert!(dura.places().eq(again.places()), "the same bits again");
-        (0..5000).for_each(|ms| _ = dura.step(from_ms + f64::from(ms), None));
+        (0..5000).for_each(|ms| _ = dura.step(from_ms + f64::from(ms), [None; 2]));
         let places: Vec<Vec3> = dura.places().collect();
         let over = dura.triangles().filter(|t| {
             let middle: Vec3 = t.iter().map(|n| places[*n as usize]).sum::<Vec3>() / 3.0;
@@ -684,5 +667,28 @@ mod tests {
         led(&mut dura, (Vec3::Z, Vec3::Z * -12.0), 500, false);
         assert!(dura.account().torn > 0 && dura.is_open());
         assert!(dura.places().all(|place| place.is_finite()));
+    }
+
+    /// Presses at one or both of two places that the axis mirrors; the forces.
+    fn pressed_at(places: [Option<f32>; 2]) -> [f32; 2] {
+        let mut dura = disc(LAW, 6);
+        let tip = |x: f32, ms: u32| {
+            let at = Vec3::new(x, 0.0, 0.4 - 1e-3 * ms.min(600) as f32);
+            Tip { at, radius_mm: 0.4, cuts: false }
+        };
+        let mut forces = [Vec3::ZERO; 2];
+        for ms in 0..1500 {
+            forces = dura.step(f64::from(ms), places.map(|x| x.map(|x| tip(x, ms))));
+        }
+        forces.map(|force| force.z)
+    }
+
+    #[test]
+    fn two_tools_press_the_sheet_each_with_its_force() {
+        let both = pressed_at([Some(4.0), Some(-4.0)]);
+        let [first, second] = [pressed_at([Some(4.0), None]), pressed_at([None, Some(4.0)])];
+        assert!(first == [second[1], second[0]] && first[0] > 0.05 && first[1] == 0.0, "{first:?} {second:?}");
+        assert!((both[0] / both[1] - 1.0).abs() < 0.02, "mirrored: {both:?}");
+        assert!((both[0] / first[0] - 1.0).abs() > 0.001, "each feels the other: {both:?} {first:?}");
     }
 }

@@ -22,6 +22,7 @@ mod dura;
 mod membrane;
 mod over;
 mod sheet;
+mod touch_force;
 
 pub use dura::{Account, Dura, Tip};
 

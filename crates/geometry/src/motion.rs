@@ -59,6 +59,9 @@ impl Buttons {
     /// Requests a redo of the stroke that was undone last.
     pub const REDO: Self = Self(32);
 
+    /// Requests that an arm hold the tool where it is, or that the arm be taken away.
+    pub const ARM: Self = Self(64);
+
     /// Requests a tool of a kind; with one in the hand, the next of that kind.
     pub fn take(kind: ToolKind) -> Self {
         Self((kind as u32 + 1) << 8)
@@ -154,7 +157,7 @@ mod tests {
 
     #[test]
     fn buttons_combine() {
-        let both = Buttons::PEDAL | Buttons::NEXT_TOOL;
+        let both = Buttons::PEDAL | Buttons::NEXT_TOOL | Buttons::ARM;
         assert!(both.has(Buttons::PEDAL) && both.has(Buttons::NEXT_TOOL));
         assert!(!Buttons::PEDAL.has(Buttons(3)));
         for (at, kind) in ToolKind::ALL.into_iter().enumerate() {

@@ -258,7 +258,7 @@ mod tests {
     fn the_flap_is_lifted_once_it_is_free() {
         let state = ToolState::at(Pose::IDENTITY);
         let tool = Program::Craniotomy.tray()[3];
-        let sample = ToolSample { tick: 0, state, tool, slot: 3, drilling: false, second: None };
+        let sample = ToolSample { tick: 0, state, tool, slot: 3, drilling: false, second: None, idle: false };
         let mut guide = Guide::new(Lesson::all(None).remove(2));
         let mut view = View { removed_mm3: 5000.0, ..View::at(sample, 1.0) };
         let mut text = |view: &View| (0..9).map(|_| guide.follow(view, [0.0; 2])).last().unwrap_or_default();
@@ -272,8 +272,15 @@ mod tests {
     #[test]
     fn steps_go_on_when_their_target_is_reached() {
         let state = ToolState::at(Pose::IDENTITY);
-        let sample =
-            ToolSample { tick: 0, state, tool: Program::Integrated.tray()[0], slot: 0, drilling: false, second: None };
+        let sample = ToolSample {
+            tick: 0,
+            state,
+            tool: Program::Integrated.tray()[0],
+            slot: 0,
+            drilling: false,
+            second: None,
+            idle: false,
+        };
         let mut view = View::at(sample, 1.0);
         let mut guide = Guide::new(Lesson::all(None).remove(0));
         assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 1 of 6"));
@@ -287,8 +294,15 @@ mod tests {
     #[test]
     fn a_resection_goes_on_with_what_was_taken() {
         let state = ToolState::at(Pose::IDENTITY);
-        let sample =
-            ToolSample { tick: 0, state, tool: Program::Brain.tray()[2], slot: 2, drilling: false, second: None };
+        let sample = ToolSample {
+            tick: 0,
+            state,
+            tool: Program::Brain.tray()[2],
+            slot: 2,
+            drilling: false,
+            second: None,
+            idle: false,
+        };
         let (view, lesson) = (View::at(sample, 1.0), Lesson::all(None).remove(5));
         assert_eq!(lesson.tumour_mm, Some(7.5));
         let mut guide = Guide::new(lesson);

@@ -262,8 +262,15 @@ mod tests {
     /// Returns the view of a tool at the origin.
     fn view(time_ms: f64) -> View {
         let tool = Program::Craniotomy.tray()[0];
-        let sample =
-            ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false, second: None };
+        let sample = ToolSample {
+            tick: 0,
+            state: ToolState::at(Pose::IDENTITY),
+            tool,
+            slot: 0,
+            drilling: false,
+            second: None,
+            idle: false,
+        };
         View { time_ms, ..View::at(sample, 1.0) }
     }
 

@@ -8,8 +8,9 @@
 //!  skull, by its versions ┤ thread of the state ──"state"──> watcher, before its loops begin
 //!  collision loop <─ask, words─┘
 //! ```
-//! A state is whole: nodes that tools cut, voxels of a lifted flap, whether the bone is open, what
-//! is left of each tetrahedron, sources, blood, burns, and when the dura was opened.
+//! A state is whole: nodes that tools cut, voxels of a lifted flap, whether the bone is open, the
+//! tool that an arm holds, what is left of each tetrahedron, sources, blood, burns, and when the
+//! dura was opened.
 //!
 //! # Practice
 //! The thread looks once a second and sends what changed, never while the flap moves; the collision
@@ -36,6 +37,7 @@ use trepan_link::topics::{Publisher, Session, TopicError};
 use trepan_link::wire::{StateRecord, TickRecord};
 use trepan_stages::CollisionStage;
 use trepan_stages::flap::FlapPlace;
+use trepan_stages::second_hand::SecondHand;
 
 /// Time between two states, ms; numerical.
 const EVERY_MS: f64 = 1000.0;
@@ -112,6 +114,7 @@ impl StateSender {
         let carved = self.bone.as_ref().map(all_changes).unwrap_or_default();
         let is_lifted = !carved.0.is_empty();
         let mut words = vec![kind_of(self.bone.as_deref()), view.bone_open.into(), view.removed_mm3.to_bits()];
+        words.extend(arm_of(&view));
         for part in [carved.0, carved.1] {
             words.push(part.len() as u64);
             words.extend(part.into_iter().map(|SceneChange { at: [x, y, z], after, .. }| {
@@ -123,6 +126,25 @@ impl StateSender {
         let (tick, time_ms, checksum) = (view.sample.tick, view.time_ms, StateRecord::sum(&words));
         stands.then_some(StateRecord { tick, time_ms, words, checksum })
     }
+}
+
+/// What an arm holds: its slot and 1, or 0, and its pose.
+fn arm_of(view: &View) -> Words {
+    let held = view.sample.second.filter(|held| held.tool != SecondHand::tool());
+    held.map_or(vec![0], |held| {
+        [held.slot as u64 + 1].into_iter().chain(words_of(held.state.world_from_tool)).collect()
+    })
+}
+
+/// A pose as words.
+fn words_of(Pose { translation: at, rotation: turn, .. }: Pose) -> [u64; 7] {
+    [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w].map(|part| u64::from(part.to_bits()))
+}
+
+/// The pose of some words.
+fn pose_of(words: [u64; 7]) -> Pose {
+    let [x, y, z, a, b, c, d] = words.map(|word| f32::from_bits(word as u32));
+    Pose::from_parts(Vec3::new(x, y, z), Quat::from_xyzw(a, b, c, d))
 }
 
 /// Checksum of a bone's grid and bounds, to tell another case.
@@ -148,9 +170,8 @@ pub(crate) fn join(name: &str, stages: &mut Stages, stop: &Stop) -> Result<Optio
 
 /// A state as a recording has it: with the tick that its session begins at in front.
 fn begun(state: &StateRecord, tick: &TickRecord) -> StateRecord {
-    let (at, turn) = (tick.proxy.translation, tick.proxy.rotation);
-    let pose = [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w].map(|part| u64::from(part.to_bits()));
-    let words: Words = [tick.time_ms.to_bits()].iter().chain(&pose).chain(&state.words).copied().collect();
+    let words: Words =
+        [tick.time_ms.to_bits()].iter().chain(&words_of(tick.proxy)).chain(&state.words).copied().collect();
     StateRecord { checksum: StateRecord::sum(&words), words, ..*state }
 }
 
@@ -159,8 +180,7 @@ pub(crate) fn begin(state: &StateRecord, stages: &mut Stages) -> Result<(), &'st
     let Some((front, words)) = state.words.split_first_chunk::<8>() else {
         return Err("its state is damaged; record it again");
     };
-    let [x, y, z, a, b, c, d] = [1, 2, 3, 4, 5, 6, 7].map(|part| f32::from_bits(front[part] as u32));
-    let proxy = Pose::from_parts(Vec3::new(x, y, z), Quat::from_xyzw(a, b, c, d));
+    let proxy = pose_of([1, 2, 3, 4, 5, 6, 7].map(|part| front[part]));
     let tick = TickRecord { time_ms: f64::from_bits(front[0]), proxy, ..TickRecord::default() };
     let checksum = if state.checksum == StateRecord::sum(&state.words) { StateRecord::sum(words) } else { 0 };
     restore(&StateRecord { words: words.into(), checksum, ..*state }, &tick, stages).map(drop)
@@ -189,6 +209,14 @@ fn restore(state: &StateRecord, tick: &TickRecord, stages: &mut Stages) -> Resul
     let mut take = || {
         words.next().filter(|kind| *kind == kind_of(bone.as_deref()))?;
         let (is_open, removed_mm3) = (words.next()? != 0, f64::from_bits(words.next()?));
+        let arm = match words.next()?.checked_sub(1) {
+            None => None,
+            Some(slot) => {
+                let mut pose = [0; 7];
+                pose.iter_mut().try_for_each(|part| words.next().map(|word| *part = word))?;
+                Some((slot as usize, pose_of(pose)))
+            }
+        };
         let place = |word: u64| {
             let [x, y, z, value] = [0, 16, 32, 48].map(|bits| (word >> bits) as u16);
             (IVec3::new(x.into(), y.into(), z.into()), value.cast_signed())
@@ -203,7 +231,8 @@ fn restore(state: &StateRecord, tick: &TickRecord, stages: &mut Stages) -> Resul
             nodes.iter().for_each(|(node, value)| _ = writer.set(*node, *value));
         }
         stages.haptic.restore(tick.proxy, is_open, removed_mm3, &voxels);
-        Some(is_open || !nodes.is_empty())
+        arm.iter().for_each(|(slot, pose)| stages.haptic.restore_arm(*slot, *pose));
+        Some(is_open || !nodes.is_empty() || arm.is_some())
     };
     take().ok_or("its state is of another case or version; give both sides the same images and program")
 }
@@ -214,11 +243,11 @@ mod tests {
     use crate::Tissue;
     use trepan_bone::{CUT_SURFACE, FlapSearch};
     use trepan_contact::SurfacePatch;
-    use trepan_geometry::{Buttons, Pose, ToolKind, ToolState, Vec3};
+    use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3};
     use trepan_haptics::{Reading, Status};
     use trepan_soft::{Body, Material, boxes};
     use trepan_stages::haptic_config::HapticConfig;
-    use trepan_stages::haptic_tick::{HapticStage, TickInput, ToolSample};
+    use trepan_stages::haptic_tick::{HapticStage, SecondTool, TickInput, ToolSample};
     use trepan_stages::program::Program;
     use trepan_stages::settling::Settling;
     use trepan_stages::{SoftFrame, SolverStage};
@@ -251,13 +280,21 @@ mod tests {
 
     /// Presses the flap's button, and waits until it is where it goes.
     fn press_flap(stages: &mut Stages) -> FlapPlace {
+        run_flap(stages);
+        stages.haptic.flap_place()
+    }
+
+    /// Does so; the tool that an arm holds at the end.
+    fn run_flap(stages: &mut Stages) -> Option<(Tool, Pose)> {
+        let mut held = None;
         for tick in 1..300 {
             let buttons = if tick == 100 { Buttons::FLAP } else { Buttons(0) };
             let reading = Reading { tool: ToolState { buttons, ..ToolState::at(FAR) }, status: Status::Fresh };
-            let input = TickInput { tick, reading, patch: &SurfacePatch::default(), patch_seq: 0, second: None };
-            stages.haptic.tick(&input, &mut |_| {});
+            let input =
+                TickInput { tick, reading, patch: &SurfacePatch::default(), patch_seq: 0, second: None, arm_n: 0.0 };
+            held = stages.haptic.tick(&input, &mut |_| {}).sample.second;
         }
-        stages.haptic.flap_place()
+        held.map(|held| (held.tool, held.state.world_from_tool))
     }
 
     /// A step of an aspirator that sinks into the block, from a time of the session on.
@@ -267,20 +304,27 @@ mod tests {
         let tip = Vec3::new(6.1, 6.2, 12.0 + tray[slot].tip_radius_mm - 0.005 * ms.min(600) as f32);
         let mut state = ToolState::at(Pose::from_translation(tip));
         (state.time_ms, state.buttons) = (start_ms + ms as f64, if ms < 700 { Buttons::PEDAL } else { Buttons(0) });
-        let sample = ToolSample { tick: ms, state, tool: tray[slot], slot, drilling: false, second: None };
+        let sample = ToolSample { tick: ms, state, tool: tray[slot], slot, drilling: false, second: None, idle: false };
         let (tissue, mut frame) = (stages.tissue.as_mut().unwrap(), SoftFrame::default());
         tissue.solver.publish(&mut frame);
         tissue.collision.step(&sample, &frame);
         &mut tissue.collision
     }
 
-    /// A watcher of a session joins it at its tick 1000; what it has to say.
-    fn joined(name: &str, trainee: &Stages, watcher: &mut Stages) -> Result<Option<StateRecord>, String> {
+    /// A watcher of a session joins it at its tick 1000, while an arm holds the tool of a slot. It
+    /// returns what it has to say.
+    fn joined(
+        name: &str,
+        trainee: &Stages,
+        watcher: &mut Stages,
+        arm: Option<usize>,
+    ) -> Result<Option<StateRecord>, String> {
         let (name, over) = (format!("{name}-{}", std::process::id()), Stop::default());
         let session = Session::join(&name).unwrap();
         let (tool, mut ticks) = (Program::Integrated.tray()[0], session.publisher().unwrap());
         let state = ToolState::at(FAR);
-        let sample = ToolSample { tick: 1001, state, tool, slot: 0, drilling: false, second: None };
+        let second = arm.map(|slot| SecondTool { tool: Program::Integrated.tray()[slot], slot, state });
+        let sample = ToolSample { tick: 1001, state, tool, slot: 0, drilling: false, second, idle: false };
         let (flap, bone_open) = (trainee.haptic.flap_place(), trainee.haptic.is_open());
         let view = View { flap, bone_open, ..View::at(sample, 1.0) };
         let (sender, _, mut asked) = StateSender::new(session.publisher().unwrap(), trainee, view);
@@ -321,7 +365,7 @@ mod tests {
             ms += 1;
         }
         assert!(wound(&trainee).0.contains(&0) && wound(&trainee).2.bled_ml > 0.0, "{:?}", wound(&trainee).1);
-        let state = joined("wound", &trainee, &mut watcher).unwrap().unwrap();
+        let state = joined("wound", &trainee, &mut watcher, Some(5)).unwrap().unwrap();
         // A replay begins with the same, from its recording.
         let mut replay = stages();
         begin(&state, &mut replay).unwrap();
@@ -331,17 +375,19 @@ mod tests {
         assert!(bone(&watcher) == bone(&trainee) && watcher.haptic.is_open());
         assert_eq!(wound(&watcher), wound(&trainee));
         assert!(wound(&watcher).2.stains.iter().any(|stain| *stain > 0));
+        let arms = [&mut watcher, &mut replay, &mut trainee].map(run_flap);
+        assert_eq!(arms, [Some((Tool::spatula(), FAR)), Some((Tool::spatula(), FAR)), None]);
         let [theirs, ours] = [(&mut trainee, 0.0), (&mut watcher, -1000.0)].map(|(stages, start_ms)| {
             let places = [press_flap(stages), press_flap(stages)];
             (places, bone(stages), step(stages, ms + 1, start_ms).loads().gravity)
         });
-        assert!(theirs == ours && ours.0 == [FlapPlace::Free, FlapPlace::Away] && ours.2 != Vec3::ZERO);
+        assert!(theirs == ours && ours.0 == [FlapPlace::Away, FlapPlace::Free] && ours.2 != Vec3::ZERO);
     }
 
     #[test]
     fn where_nothing_has_happened_nothing_changes_and_what_does_not_fit_is_refused() {
         let (trainee, mut watcher, tick) = (stages(), stages(), TickRecord::default());
-        assert_eq!(joined("same", &trainee, &mut watcher), Ok(None));
+        assert_eq!(joined("same", &trainee, &mut watcher, None), Ok(None));
         let kind = kind_of(watcher.haptic.bone().map(|bone| &**bone));
         for (words, checksum, why) in [
             (vec![kind, 1], Some(0), "damaged; start watching again"),

@@ -42,6 +42,7 @@ use trepan_soft::Loads;
 use trepan_stages::collision_step::{CollisionStage, SoftFrame, Wound};
 use trepan_stages::flap::FlapPlace;
 use trepan_stages::force_scale::ForceScale;
+use trepan_stages::haptic_tick::SecondTool;
 use trepan_stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use trepan_stages::notice::{Notice, What};
 use trepan_stages::program::Program;
@@ -161,7 +162,7 @@ impl View {
         let slot = usize::from(slot).min(tray.len() - 1);
         let drilling = record.has(TickRecord::DRILLING);
         Self {
-            sample: ToolSample { tick, state, tool: tray[slot], slot, drilling, second: None },
+            sample: ToolSample { tick, state, tool: tray[slot], slot, drilling, second: None, idle: false },
             time_ms,
             force: record.wrench.force,
             task_n: self.force_scale.task_n(record),
@@ -184,6 +185,9 @@ pub struct RenderInputs {
     pub film: Option<Receiver<Shot>>,
 }
 
+/// Surface patches of the first hand's tool, and of the second's or an arm's.
+pub type Patches = [SurfacePatch; 2];
+
 /// A collision result with its sequence number.
 pub type Numbered<T> = (u64, T);
 
@@ -194,7 +198,7 @@ pub struct Cells {
     /// Haptic loop to rendering.
     pub view: (Writer<View>, Reader<View>),
     /// Collision loop to haptic loop.
-    pub patch: (Writer<Numbered<SurfacePatch>>, Reader<Numbered<SurfacePatch>>),
+    pub patch: (Writer<Numbered<Patches>>, Reader<Numbered<Patches>>),
     /// Collision loop to solver loop.
     pub loads: (Writer<Numbered<Loads>>, Reader<Numbered<Loads>>),
     /// Solver loop to collision loop.
@@ -222,7 +226,7 @@ impl Cells {
         Self {
             tool: cell(sample),
             view: cell(view),
-            patch: cell((0, SurfacePatch::default())),
+            patch: cell((0, Patches::default())),
             loads: cell((0, loads)),
             soft: cell(frame.clone()),
             wound: cell(wound),
@@ -327,8 +331,18 @@ impl Ticks {
         self.times.add_us(tick.record.compute_us);
     }
 
-    /// Returns the view after a tick.
-    pub fn view(&self, tick: &Tick, stage: &HapticStage, second: Option<SecondView>, finished: bool) -> View {
+    /// Returns the view after a tick, with the second hand, or an arm by the force of its patch.
+    pub fn view(
+        &self,
+        tick: &Tick,
+        stage: &HapticStage,
+        (second, patches): (Option<SecondView>, &Patches),
+        finished: bool,
+    ) -> View {
+        let on_arm = patches[1].force_n * patches[1].normal;
+        let view =
+            |SecondTool { tool, state, .. }| SecondView { tool, world_from_tool: state.world_from_tool, force: on_arm };
+        let second = second.or(tick.sample.second.map(view));
         View {
             sample: tick.sample,
             time_ms: tick.record.time_ms,

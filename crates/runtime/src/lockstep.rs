@@ -17,6 +17,7 @@
 //! the largest difference. Steps of another length are matched by simulated time. The replay runs
 //! as fast as it can; for a window with a time bar it also makes a film (`run/film.rs`).
 
+use crate::Patches;
 use crate::clock::Clock;
 use crate::film::{Filming, Shot};
 use crate::joining;
@@ -121,7 +122,7 @@ struct Replay<'a> {
     senders: JournalSenders,
     ticks: Ticks,
     tools: VecDeque<ToolSample>,
-    patches: VecDeque<Numbered<SurfacePatch>>,
+    patches: VecDeque<Numbered<Patches>>,
     loads: VecDeque<Numbered<Loads>>,
     load: Numbered<Loads>,
     frame: SoftFrame,
@@ -154,7 +155,7 @@ impl<'a> Replay<'a> {
             senders,
             ticks: Ticks::default(),
             tools: VecDeque::from([start]),
-            patches: VecDeque::from([(0, SurfacePatch::default())]),
+            patches: VecDeque::from([(0, Patches::default())]),
             loads: VecDeque::from([(0, Loads::default())]),
             load: (0, Loads::default()),
             frame: SoftFrame::default(),
@@ -173,11 +174,12 @@ impl<'a> Replay<'a> {
     fn tick(&mut self, record: &TickRecord, clock: &Clock) -> View {
         self.collide_up_to(record.patch_seq, clock);
         let known = self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq);
-        let (patch_seq, patch) = known.copied().unwrap_or_default();
+        let (patch_seq, patches) = known.copied().unwrap_or_default();
+        let (patch, arm_n) = (&patches[0], patches[1].force_n);
         let &TickRecord { tick, device, twist, buttons, time_ms, flags, .. } = record;
         let tool = ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms };
         let reading = reading(tool, flags);
-        let input = TickInput { tick, reading, patch: &patch, patch_seq, second: self.second_place };
+        let input = TickInput { tick, reading, patch, patch_seq, second: self.second_place, arm_n };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
         }
@@ -187,7 +189,7 @@ impl<'a> Replay<'a> {
             ticks.record(notice);
             notices.send(notice);
         });
-        let second = self.second_tick(record.tick);
+        let second = self.second_tick(record.tick, &patches[1]);
         self.second_place = self.second.as_ref().and_then(SecondHand::place);
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
@@ -199,12 +201,12 @@ impl<'a> Replay<'a> {
         while !self.senders.ticks.send(tick.record) {
             thread::yield_now();
         }
-        self.ticks.view(&tick, &self.haptic, second.map(|(view, _)| view), false)
+        self.ticks.view(&tick, &self.haptic, (second.map(|(view, _)| view), &patches), false)
     }
 
     /// Replays the second hand's tick of this number, if it was recorded; also returns whether its
     /// force equals the recorded one.
-    fn second_tick(&mut self, number: u64) -> Option<(SecondView, bool)> {
+    fn second_tick(&mut self, number: u64, patch: &SurfacePatch) -> Option<(SecondView, bool)> {
         let record = self.seconds.as_slice().first().filter(|record| record.tick <= number)?;
         self.seconds.next();
         let stage = self.second.as_mut()?;
@@ -214,7 +216,7 @@ impl<'a> Replay<'a> {
         let (notices, ticks) = (&mut self.senders.notices, &mut self.ticks);
         let &SecondRecord { device, twist, buttons, time_ms, flags, .. } = record;
         let tool = ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms };
-        let (wrench, again) = stage.tick(record.tick, &reading(tool, flags), &mut |notice| {
+        let (wrench, again) = stage.tick(record.tick, &reading(tool, flags), patch, &mut |notice| {
             ticks.record(notice);
             notices.send(notice);
         });
@@ -222,7 +224,8 @@ impl<'a> Replay<'a> {
             thread::yield_now();
         }
         let same = self.same(record.wrench, again.wrench);
-        Some((SecondView { world_from_tool: again.proxy, force: wrench.force() }, same))
+        let view = SecondView { tool: SecondHand::tool(), world_from_tool: again.proxy, force: wrench.force() };
+        Some((view, same))
     }
 
     /// Runs every collision step up to a number, each with its recorded tool and brain state.
@@ -237,7 +240,7 @@ impl<'a> Replay<'a> {
             let mut record = tissue.collision.step(&tool, &self.frame);
             record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
             self.collision_times.add_us(record.compute_us);
-            remember(&mut self.patches, (record.seq, *tissue.collision.patch()));
+            remember(&mut self.patches, (record.seq, *tissue.collision.patches()));
             remember(&mut self.loads, (record.seq, tissue.collision.loads().clone()));
             self.senders.collisions.send(record);
         }
@@ -415,9 +418,11 @@ mod tests {
                 patch: &SurfacePatch::default(),
                 patch_seq: 0,
                 second: second_place,
+                arm_n: 0.0,
             };
             recording.ticks.push(haptic.tick(&input, &mut |notice| raised.push(notice)).record);
-            recording.second.push(second.tick(tick.into(), &other, &mut |notice| raised.push(notice)).1);
+            let free = SurfacePatch::default();
+            recording.second.push(second.tick(tick.into(), &other, &free, &mut |notice| raised.push(notice)).1);
             second_place = second.place();
         }
         let undo = |what: &What| matches!(what, What::Undone(_) | What::NotUndone(_));
@@ -432,7 +437,15 @@ mod tests {
         let (again, stages) = both_hands();
         let (senders, _pages) = journal(ForceScale::default());
         let tool = Program::Craniotomy.tray()[0];
-        let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false, second: None };
+        let start = ToolSample {
+            tick: 0,
+            state: at(20.0, Buttons(0)),
+            tool,
+            slot: 0,
+            drilling: false,
+            second: None,
+            idle: false,
+        };
         let mut replay = Replay::new(stages, &recording, senders, start);
         recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
         assert_eq!((replay.replayed.identical, replay.replayed.ticks), (4399, 4399));

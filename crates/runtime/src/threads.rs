@@ -17,7 +17,7 @@ use crate::clock::{Clock, Schedule, Waits};
 use crate::joining::{self, StateAsked, StateSender};
 use crate::journal::{Journal, JournalSenders, journal};
 use crate::stop::Stop;
-use crate::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
+use crate::{Cells, Numbered, Outcome, Patches, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_contact::{GuardedWrench, SurfacePatch};
@@ -50,15 +50,16 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
         waits.until(schedule.next_ms(), &clock);
         let now_ms = clock.now_ms();
         let reading = hands.owner.device.read(now_ms);
-        let &(patch_seq, patch) = ends.patch.latest().0;
-        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: second_place };
+        let &(patch_seq, patches) = ends.patch.latest().0;
+        let (patch, arm_n) = (&patches[0], patches[1].force_n);
+        let input = TickInput { tick: ticks.count + 1, reading, patch, patch_seq, second: second_place, arm_n };
         let mut notify = |notice| {
             ticks.record(notice);
             ends.notices.send(notice);
         };
         let mut tick = hands.stage.tick(&input, &mut notify);
         hands.owner.device.apply(tick.wrench);
-        let second_view = hands.second.as_mut().map(|second| second.tick(input.tick, now_ms, &mut notify));
+        let second_view = hands.second.as_mut().map(|second| second.tick(input.tick, now_ms, &patches[1], &mut notify));
         second_place = hands.second.as_ref().and_then(|second| second.stage.place());
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
@@ -69,7 +70,7 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
             ending = Some(ticks.count);
         }
         let finished = ending.is_some_and(|since| hands.is_at_rest() || ticks.count - since > FADE_TICKS);
-        ends.publish(&tick, ticks.view(&tick, &hands.stage, second_view, finished));
+        ends.publish(&tick, ticks.view(&tick, &hands.stage, (second_view, &patches), finished));
         if finished {
             let end_force_n = if hands.stage.is_at_rest() { tick.wrench.force().length() } else { 0.0 };
             let of_stages = Outcome::of(&hands.stage, hands.second.as_ref().map(|second| &second.stage));
@@ -94,7 +95,7 @@ fn collision_loop(
         let began_ms = clock.now_ms();
         let sample = *ends.tool.latest().0;
         let mut record = stage.step(&sample, ends.soft.latest().0);
-        ends.patch.set((record.seq, *stage.patch()));
+        ends.patch.set((record.seq, *stage.patches()));
         ends.loads.write(|(seq, loads)| {
             *seq = record.seq;
             (loads.gravity, loads.fluid) = (stage.loads().gravity, stage.loads().fluid);
@@ -254,7 +255,7 @@ struct HapticEnds {
     view: Writer<View>,
     filmed: Writer<View>,
     kept: Option<Writer<View>>,
-    patch: Reader<Numbered<SurfacePatch>>,
+    patch: Reader<Numbered<Patches>>,
     ticks: Sender<TickRecord>,
     notices: Sender<Notice>,
 }
@@ -301,12 +302,12 @@ struct Second {
 impl Second {
     /// Reads the device, runs the tick and applies the force, after the first hand's tick of the
     /// same number.
-    fn tick(&mut self, tick: u64, now_ms: f64, notify: &mut dyn FnMut(Notice)) -> SecondView {
+    fn tick(&mut self, tick: u64, now_ms: f64, patch: &SurfacePatch, notify: &mut dyn FnMut(Notice)) -> SecondView {
         let reading = self.owner.device.read(now_ms);
-        let (wrench, record) = self.stage.tick(tick, &reading, notify);
+        let (wrench, record) = self.stage.tick(tick, &reading, patch, notify);
         self.owner.device.apply(wrench);
         self.records.send(record);
-        SecondView { world_from_tool: record.proxy, force: wrench.force() }
+        SecondView { tool: SecondHand::tool(), world_from_tool: record.proxy, force: wrench.force() }
     }
 }
 
@@ -314,7 +315,7 @@ impl Second {
 struct CollisionEnds {
     tool: Reader<ToolSample>,
     soft: Reader<SoftFrame>,
-    patch: Writer<Numbered<SurfacePatch>>,
+    patch: Writer<Numbered<Patches>>,
     loads: Writer<Numbered<Loads>>,
     wound: Writer<Wound>,
     asked: Option<StateAsked>,

@@ -72,10 +72,13 @@ fn setup(line: &str, recording: Option<&Recording>) -> SessionSetup {
     SessionSetup::new(program, (case(), models), operation, false).unwrap()
 }
 
-fn stages(setup: &SessionSetup) -> Stages {
+fn stages(setup: &SessionSetup, two_hands: bool) -> Stages {
     let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0, None);
-    setup.stages(hand(0), 1.0, (&limits, None)).unwrap()
+    setup.stages(hand(0), 1.0, (&limits, two_hands.then_some(&limits))).unwrap()
 }
+
+/// The tool in a hand at a time, ms.
+type Hand = fn(u64) -> ToolState;
 
 /// The tool in the hand at a time, ms. A burr slides over the bone, drills, and leans on the rim of
 /// the hole; then a probe presses the brain and slides.
@@ -106,29 +109,47 @@ fn aspirating(ms: u64) -> ToolState {
     ToolState { time_ms: ms as f64, buttons, ..ToolState::at(world_from_tool) }
 }
 
+/// The second hand's aspirator presses the brain beside the probe of the first.
+fn beside(ms: u64) -> ToolState {
+    let deep_mm = if (650..1100).contains(&ms) { 23.0 * ((ms - 650) as f32 / 250.0).min(1.0) } else { 0.0 };
+    let buttons = if ms > 950 { Buttons::PEDAL } else { Buttons(0) };
+    let pose = Pose::from_translation(Vec3::new(-3.5, 0.3, 14.0 - deep_mm));
+    ToolState { time_ms: ms as f64, buttons, ..ToolState::at(pose) }
+}
+
 /// Runs the operation, each loop as if it kept pace.
 fn operated(line: &str) -> (Recording, SessionSetup) {
-    let (recording, setup, _) = operated_by(hand, line, END);
+    let (recording, setup, _) = operated_by((hand, None), line, END);
     (recording, setup)
 }
 
 /// The same by a hand, with the cheaper solver from a tick on; also what it made of the brain.
-fn operated_by(hand: fn(u64) -> ToolState, line: &str, cheaper_from: u64) -> (Recording, SessionSetup, SolverOutcome) {
+fn operated_by(
+    (hand, other): (Hand, Option<Hand>),
+    line: &str,
+    cheaper_from: u64,
+) -> (Recording, SessionSetup, SolverOutcome) {
     let setup = setup(&format!("--quality usual {line}"), None);
-    let Stages { mut haptic, tissue, .. } = stages(&setup);
+    let Stages { mut haptic, mut second, tissue } = stages(&setup, other.is_some());
     let mut tissue = tissue.expect("the program has tissue");
-    let (mut recording, mut frame, mut patch) =
-        (Recording::default(), SoftFrame::default(), (0, SurfacePatch::default()));
+    let (mut recording, mut frame, mut seq, mut place) = (Recording::default(), SoftFrame::default(), 0, None);
+    let mut patches = [SurfacePatch::default(); 2];
     for tick in 1..END {
         let reading = Reading { tool: hand(tick), status: Status::Fresh };
-        let input = TickInput { tick, reading, patch: &patch.1, patch_seq: patch.0, second: None };
+        let arm_n = patches[1].force_n;
+        let input = TickInput { tick, reading, patch: &patches[0], patch_seq: seq, second: place, arm_n };
         let done = haptic.tick(&input, &mut |_| {});
+        if let Some((second, hand)) = second.as_mut().zip(other) {
+            let reading = Reading { tool: hand(tick), status: Status::Fresh };
+            recording.second.push(second.tick(tick, &reading, &patches[1], &mut |_| {}).1);
+            place = second.place();
+        }
         if tick == cheaper_from {
             tissue.solver.wait_for_cheaper();
         }
         tissue.solver.publish(&mut frame);
         let collision = tissue.collision.step(&done.sample, &frame);
-        patch = (collision.seq, *tissue.collision.patch());
+        (seq, patches) = (collision.seq, *tissue.collision.patches());
         while tissue.solver.time_ms() < tick as f64 {
             recording.solver.extend(tissue.solver.step(tissue.collision.loads(), collision.seq));
         }
@@ -153,8 +174,8 @@ fn replayed(recording: &Recording) -> (u64, SessionSetup) {
 fn again(recording: &Recording) -> (Outcome, SessionSetup) {
     let setup = setup("", Some(recording));
     let tool = Program::Integrated.tray()[0];
-    let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false, second: None };
-    (lockstep::compare(stages(&setup), recording, start), setup)
+    let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false, second: None, idle: false };
+    (lockstep::compare(stages(&setup, !recording.second.is_empty()), recording, start), setup)
 }
 
 /// Largest difference on bone and on the brain: of the forces, N, and of the torques, N mm.
@@ -256,7 +277,7 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
     let line = "--set element=locking-free,law=stiffening,relaxation=prony,threads=2";
     // While the probe is deep in the brain, which has relaxed under it.
     let from = 1050;
-    let [(plain, ..), (cheaper, ..)] = [END, from].map(|from| operated_by(hand, line, from));
+    let [(plain, ..), (cheaper, ..)] = [END, from].map(|from| operated_by((hand, None), line, from));
     assert_eq!(replayed(&cheaper).0, END - 1);
     let records = |recording: &Recording| recording.solver.iter().filter(|record| record.cheaper > 0).count();
     assert!(records(&plain) == 0 && records(&cheaper) > 100);
@@ -273,7 +294,7 @@ fn a_cheaper_solver_goes_on_without_a_jump_and_a_replay_changes_at_the_same_step
 #[test]
 fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
     let line = "--set element=locking-free --aspiration 50 --bleeding 20";
-    let (recording, setup, SolverOutcome { fills, wound, .. }) = operated_by(aspirating, line, 1100);
+    let (recording, setup, SolverOutcome { fills, wound, .. }) = operated_by((aspirating, None), line, 1100);
     let resection = setup.resection(&fills).unwrap();
     let names: Vec<&str> = resection.tissues.keys().map(String::as_str).collect();
     assert!(resection.healthy_mm3 > 30.0 && names == ["brain", "grey"], "{resection:?}");
@@ -287,12 +308,42 @@ fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
     assert_eq!((same.bled_ml, same.sucked_ml, &same.stains), (bled.bled_ml, bled.sucked_ml, &bled.stains));
     assert_eq!(again.replayed.unwrap().identical, END - 1);
     let (pressed, without, SolverOutcome { fills: whole, .. }) =
-        operated_by(aspirating, "--set element=locking-free --aspiration 0", 1100);
+        operated_by((aspirating, None), "--set element=locking-free --aspiration 0", 1100);
     assert!(whole.is_empty() && without.resection(&whole).is_none());
     let sum_n = |recording: &Recording| recording.ticks.iter().map(|tick| tick.wrench.force.length()).sum::<f32>();
     assert!(sum_n(&recording) < 0.97 * sum_n(&pressed), "{} {} N", sum_n(&recording), sum_n(&pressed));
-    let (_, rival, SolverOutcome { fills: whole, .. }) = operated_by(aspirating, "--set search=hashed-grid", END);
+    let (_, rival, SolverOutcome { fills: whole, .. }) =
+        operated_by((aspirating, None), "--set search=hashed-grid", END);
     assert!(whole.is_empty() && rival.no_aspiration().is_some_and(|why| why.contains("search=walk")));
+}
+
+#[test]
+fn two_hands_on_the_brain_feel_each_other_and_replay_bit_for_bit() {
+    let line = "--set element=locking-free --aspiration 50 --bleeding 20";
+    let (alone, ..) = operated_by((hand, None), line, END);
+    let (both, setup, SolverOutcome { fills, .. }) = operated_by((hand, Some(beside)), line, END);
+    let peak_n = both.second.iter().map(|tick| tick.wrench.force.length()).fold(0.0, f32::max);
+    assert!(peak_n > 0.05, "the second hand feels the brain: {peak_n} N");
+    assert!(difference(&alone, &both)[1][0] > 0.01, "and the first feels the second");
+    assert!(setup.resection(&fills).is_some_and(|made| made.healthy_mm3 > 3.0), "its aspirator takes tissue");
+    assert_eq!(replayed(&both).0, END - 1);
+}
+
+#[test]
+fn an_arm_holds_a_tool_and_a_replay_holds_it_too() {
+    let held = |ms: u64| {
+        let ToolState { world_from_tool, buttons, .. } = hand(ms);
+        let buttons = if ms == 950 { Buttons::ARM } else { buttons };
+        let back = Vec3::Z * 0.1 * ms.saturating_sub(950) as f32;
+        let pose = Pose::from_parts(world_from_tool.translation + back, world_from_tool.rotation);
+        ToolState { time_ms: ms as f64, buttons, ..ToolState::at(pose) }
+    };
+    let (recording, _, made) = operated_by((held, None), "", END);
+    assert!(made.end_displacement_mm > 0.5 * made.max_displacement_mm, "{made:?}");
+    let tools = [900, 1200].map(|tick| recording.ticks[tick].tool);
+    let kinds = tools.map(|slot| Program::Integrated.tray()[usize::from(slot)].kind);
+    assert_eq!(kinds, [ToolKind::Probe, ToolKind::Aspirator]);
+    assert_eq!(replayed(&recording).0, END - 1);
 }
 
 #[test]

@@ -417,7 +417,7 @@ impl Session {
     fn start(&self) -> ToolSample {
         let script = Script::named(self.program.script(), &self.setup.scene.site, 1e4);
         let state = script.map_or_else(|_| ToolState::at(trepan_geometry::Pose::IDENTITY), |script| script.at(0.0));
-        ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false, second: None }
+        ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false, second: None, idle: false }
     }
 
     fn graphics(&self, drawing: Option<Result<Gpu, GpuError>>) -> Result<Graphics, NoPicture> {
@@ -661,6 +661,7 @@ mod tests {
                 slot: 0,
                 drilling: false,
                 second: None,
+                idle: false,
             },
             1.0,
         );

@@ -188,7 +188,7 @@ impl SessionSetup {
         };
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
-        let tissue = self.brain().map(|brain| self.tissue(brain, &rigid, &with)).transpose()?;
+        let tissue = self.brain().map(|brain| self.tissue(brain, &rigid, &with, second.is_some())).transpose()?;
         let second = second.map(|limits| SecondHand::new(config(limits), bone.clone(), field.clone()));
         let search = bone.as_ref().map(|bone| self.plan.search(bone));
         let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
@@ -229,7 +229,13 @@ impl SessionSetup {
         .map_err(|fault| brain_error(&fault))
     }
 
-    fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<Tissue, SessionError> {
+    fn tissue(
+        &self,
+        brain: &RestBrain,
+        rigid: &Method,
+        with: &Ingredients,
+        two_hands: bool,
+    ) -> Result<Tissue, SessionError> {
         let (BrainSupport { fixed, anchors, mut wall }, settling) = self.held(brain)?;
         let body = brain.body(with.materials(self.young_mpa), with.pia_arachnoid_n_per_mm, &fixed, &anchors);
         // The graphics card cannot take tissue away yet.
@@ -241,6 +247,7 @@ impl SessionSetup {
         let touch = touch(&brain.mesh, with)?;
         let collision = CollisionStage::new(self.program, &brain.mesh, &touch, wall)
             .and_then(|stage| if with.folds { stage.folding(&brain.mesh) } else { Ok(stage) })
+            .and_then(|stage| if two_hands { stage.with_second_hand(&brain.mesh, &touch) } else { Ok(stage) })
             .map_err(|fault| brain_error(&fault))?
             .under_pressure(with.surface_pressure_mmhg > 0.0)
             .turning(rigid.descriptor().extent == Extent::BallAndShaft)

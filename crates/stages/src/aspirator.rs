@@ -20,10 +20,8 @@
 //! Rate by tissue, tip area and suction: Cimino and Bond, Ultrasound Med. Biol. 22, 1996, abstract.
 //! Rates are the caller's; none is calibrated.
 
-use crate::haptic_tick::ToolSample;
 use std::f32::consts::PI;
 use trepan_deformable::TissueCollision;
-use trepan_geometry::{Buttons, ToolKind};
 use trepan_mesh::{TetMesh, Topology};
 
 /// Fill of a whole tetrahedron, and that below which it goes as a whole.
@@ -119,14 +117,19 @@ impl Aspirator {
         }
     }
 
-    /// Takes what the tool touches, and lowers the fills of those tetrahedra.
-    pub fn step(&mut self, sample: &ToolSample, tool: &TissueCollision, fills: &mut [u16]) {
+    /// Takes what tubes touch, each with the radius of its tip, mm; lowers the fills of those
+    /// tetrahedra.
+    pub fn step<'a>(
+        &mut self,
+        now_ms: f64,
+        tubes: impl Iterator<Item = (f32, &'a TissueCollision)>,
+        fills: &mut [u16],
+    ) {
         self.thinned.clear();
         self.steps += 1;
-        let now_ms = sample.state.time_ms;
         let dt_ms = (now_ms - std::mem::replace(&mut self.last_ms, now_ms)).clamp(0.0, LONGEST_MS) as f32;
-        if sample.tool.kind == ToolKind::Aspirator && sample.state.buttons.has(Buttons::PEDAL) {
-            let area_mm2 = 4.0 * PI * sample.tool.tip_radius_mm.powi(2) / tool.points() as f32;
+        for (radius_mm, tool) in tubes {
+            let area_mm2 = 4.0 * PI * radius_mm.powi(2) / tool.points() as f32;
             for tet in tool.tets_touched() {
                 self.take(tet, self.rates[tet as usize] * area_mm2 * dt_ms, fills);
             }

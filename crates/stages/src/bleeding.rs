@@ -5,11 +5,10 @@
 //! has the same. An aspirator with its pedal down sucks, in either hand; bipolar forceps coagulate
 //! and rinse. Blood puts no force on hand or brain.
 
-use crate::haptic_tick::ToolSample;
-use crate::second_hand::SecondHand;
+use crate::haptic_tick::SecondTool;
 use serde::Serialize;
 use trepan_bleeding::{Act, Perfusion, Wound};
-use trepan_geometry::{Buttons, ToolKind, Vec3};
+use trepan_geometry::{ToolKind, Vec3};
 use trepan_mesh::TetMesh;
 
 /// Picolitres in a ml.
@@ -59,19 +58,18 @@ impl Bleeder {
         Self { wound: Wound::of(mesh, perfusion), up }
     }
 
-    /// Takes tetrahedra away, goes on to the tool's time, and keeps account.
+    /// Takes tetrahedra away, goes on to a time with the tools whose pedal is down, and keeps
+    /// account.
     pub fn step(
         &mut self,
-        sample: &ToolSample,
+        now_ms: f64,
+        used: [Option<SecondTool>; 2],
         positions: &[Vec3],
         gone: impl Iterator<Item = u32>,
         now: &mut Bleeding,
     ) {
-        let now_ms = sample.state.time_ms;
         gone.for_each(|tet| self.wound.remove(tet, positions, now_ms));
-        let hands = [Some((sample.tool, sample.state)), sample.second.map(|state| (SecondHand::tool(), state))];
-        let tools = hands.into_iter().flatten().filter(|(_, state)| state.buttons.has(Buttons::PEDAL));
-        let acts = tools.filter_map(|(tool, state)| {
+        let acts = used.into_iter().flatten().filter_map(|SecondTool { tool, state, .. }| {
             let act = match tool.kind {
                 ToolKind::Aspirator => Act::Suck,
                 ToolKind::Bipolar => Act::Coagulate,
@@ -98,33 +96,32 @@ impl Bleeder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::second_hand::SecondHand;
     use trepan_geometry::{Pose, Tool, ToolState};
     use trepan_soft::boxes;
 
-    /// A block bleeds from a hole in its top while the first hand holds still over it.
+    /// A block bleeds from a hole in its top while the first hand's forceps are far above it.
     #[test]
-    fn the_second_hands_aspirator_sucks_while_its_pedal_is_down() {
+    fn an_aspirator_of_the_second_hand_sucks() {
         let mesh = boxes::split_box([4, 4, 4], Vec3::splat(8.0));
         let brain = Perfusion { capillaries: 1.0, vessel: 1.0 };
         let top = Vec3::new(4.0, 4.0, 8.0);
         let middle = |tet: u32| mesh.corners(tet as usize).into_iter().sum::<Vec3>() / 4.0;
         let hole: Vec<u32> = (0..mesh.tets.len() as u32).filter(|&tet| middle(tet).distance(top) < 2.0).collect();
-        let at = |place: Vec3, buttons: Buttons| ToolState { buttons, ..ToolState::at(Pose::from_translation(place)) };
-        let sucked_ml = |second: Option<ToolState>| {
+        let at =
+            |place: Vec3, tool: Tool| SecondTool { tool, slot: 0, state: ToolState::at(Pose::from_translation(place)) };
+        let sucked_ml = |second: Option<SecondTool>| {
             let mut bleeder = Bleeder::of(&mesh, &vec![brain; mesh.tets.len()], Vec3::Z);
             let mut now = Bleeding { stains: vec![0; mesh.positions.len()], ..Bleeding::default() };
             for tick in 1..2000 {
-                let mut state = at(top + 30.0 * Vec3::Z, Buttons::PEDAL);
-                state.time_ms = tick as f64;
-                let sample = ToolSample { tick, state, tool: Tool::bipolar(), slot: 0, drilling: false, second };
+                let used = [Some(at(top + 30.0 * Vec3::Z, Tool::bipolar())), second];
                 let gone = hole.iter().copied().filter(|_| tick == 1);
-                bleeder.step(&sample, &mesh.positions, gone, &mut now);
+                bleeder.step(f64::from(tick), used, &mesh.positions, gone, &mut now);
             }
             assert!(now.bled_ml > 0.1 && now.coagulated == 0, "{:?}", now.bled_ml);
             now.sucked_ml
         };
         assert_eq!(sucked_ml(None), 0.0);
-        assert_eq!(sucked_ml(Some(at(top, Buttons(0)))), 0.0, "its pedal is up");
-        assert!(sucked_ml(Some(at(top - 1.5 * Vec3::Z, Buttons::PEDAL))) > 0.1);
+        assert!(sucked_ml(Some(at(top - 1.5 * Vec3::Z, SecondHand::tool()))) > 0.1);
     }
 }

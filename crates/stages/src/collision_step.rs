@@ -3,16 +3,17 @@
 //!
 //! # Practice
 //! With a tool for bone the result only causes warnings: the patch goes to the haptic thread, the
-//! solver gets no contact of it (thesis 6.4). A tool for the brain collides with tip and shaft.
-//! From its first use on, the skull supports the brain against the probe and its own weight; under
-//! surface pressure it does so from the start. The stage has no clock; the same tools and positions
-//! give the same results.
+//! solver gets no contact of it (thesis 6.4). A tool for the brain collides with tip and shaft, and
+//! so does that of the second hand or of an arm. From its first use on, the skull supports the
+//! brain against the probe and its own weight; under surface pressure it does so from the start. The
+//! stage has no clock; the same tools and positions give the same results.
 
 use crate::aspirator::Aspirator;
 use crate::bleeding::{Bleeder, Bleeding};
 use crate::dura::{DuraState, Membrane};
-use crate::haptic_tick::ToolSample;
+use crate::haptic_tick::{SecondTool, ToolSample};
 use crate::program::{Phase, Program};
+use crate::second_hand::SecondHand;
 use crate::settling::Settling;
 use crate::skull_wall::SkullWall;
 use std::sync::Arc;
@@ -21,39 +22,49 @@ use trepan_bone::BoneVolume;
 use trepan_contact::{MAX_SPRINGS, NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, MeshCollision, NodeContact, TissueCollision, TissueStep};
 use trepan_dura::Dura;
-use trepan_geometry::{Buttons, Tool, Vec3};
+use trepan_geometry::{Buttons, Tool, ToolKind, Vec3};
 use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
 use trepan_soft::Loads;
 
 impl CollisionStage {
-    /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
+    /// Runs a step; its results are in [`patches`](Self::patches) and [`loads`](Self::loads).
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
-        self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
-        self.patch = SurfacePatch { tissue_ms: soft.time_ms, ..self.step.patch };
-        if !self.with_torque {
-            self.patch.couple_mm = Vec3::ZERO;
-        }
+        let first = SecondTool { tool: sample.tool, slot: sample.slot, state: sample.state };
+        self.touch(0, Some(first), soft);
+        self.touch(1, sample.second, soft);
         let is_open = self.meet_dura(sample, soft);
         self.aspirate(sample, soft);
-        let phase = if is_open { sample.phase() } else { Phase::Craniotomy };
+        let is_touched = sample.phase() == Phase::Brain || self.steps[1].points_in_contact > 0;
+        let phase = if is_open && is_touched { Phase::Brain } else { Phase::Craniotomy };
         self.settling.load(phase, sample.state.time_ms, &mut self.loads);
-        self.press(sample.phase(), soft);
+        self.press(sample, soft);
         self.seq += 1;
         CollisionRecord {
             seq: self.seq,
             tick: sample.tick,
             solver_step: soft.step,
-            depth_mm: self.step.manifold.depth_mm,
-            points: self.step.points_in_contact,
+            depth_mm: self.steps[0].manifold.depth_mm,
+            points: self.steps[0].points_in_contact,
             compute_us: 0.0,
         }
+    }
+
+    /// Collides a hand's tool with the brain.
+    fn touch(&mut self, hand: usize, tool: Option<SecondTool>, soft: &SoftFrame) {
+        let step = &mut self.steps[hand];
+        match tool.and_then(|tool| Some((self.tools.get_mut(tool.slot)?, tool.state))) {
+            Some((tissue, state)) => tissue.step(&soft.positions, &soft.velocities, &state, step),
+            None => *step = TissueStep { patch: SurfacePatch::default(), points_in_contact: 0, ..std::mem::take(step) },
+        }
+        let couple_mm = if self.with_torque { step.patch.couple_mm } else { Vec3::ZERO };
+        self.patches[hand] = SurfacePatch { tissue_ms: soft.time_ms, couple_mm, ..step.patch };
     }
 
     /// Lets the tool meet the dura; returns whether that is open.
     fn meet_dura(&mut self, sample: &ToolSample, soft: &SoftFrame) -> bool {
         self.dura.as_mut().is_none_or(|dura| {
-            dura.step(sample, &soft.positions, &mut self.patch, &mut self.wound.dura);
+            dura.step(sample, &soft.positions, &mut self.patches, &mut self.wound.dura);
             dura.is_open()
         })
     }
@@ -61,26 +72,30 @@ impl CollisionStage {
     /// Takes tissue away that an aspirator touches; contact feels that from the next step on.
     fn aspirate(&mut self, sample: &ToolSample, soft: &SoftFrame) {
         let Some(aspirator) = &mut self.aspirator else { return };
-        let mut sample = *sample;
-        if self.dura.as_ref().is_some_and(Membrane::covers) {
-            sample.state.buttons.0 &= !Buttons::PEDAL.0;
-        }
-        let sample = &sample;
-        aspirator.step(sample, &self.tools[sample.slot], &mut self.loads.fills);
+        let is_covered = self.dura.as_ref().is_some_and(Membrane::covers);
+        let may = |tool: &SecondTool| tool.state.buttons.has(Buttons::PEDAL) && !is_covered;
+        let used = sample.tools().map(|tool| tool.filter(may));
+        let now_ms = sample.state.time_ms;
+        let tubes = used.iter().flatten().filter(|used| used.tool.kind == ToolKind::Aspirator);
+        let tubes = tubes.filter_map(|used| Some((used.tool.tip_radius_mm, self.tools.get(used.slot)?)));
+        aspirator.step(now_ms, tubes, &mut self.loads.fills);
         for tool in &mut self.tools {
             aspirator.thinned.iter().for_each(|&tet| tool.thin(tet, self.loads.fills[tet as usize]));
         }
         if let Some(bleeder) = &mut self.bleeder {
             let gone = aspirator.thinned.iter().copied().filter(|&tet| self.loads.fills[tet as usize] == 0);
-            bleeder.step(sample, &soft.positions, gone, &mut self.wound.bleeding);
+            bleeder.step(now_ms, used, &soft.positions, gone, &mut self.wound.bleeding);
         }
     }
 
-    fn press(&mut self, phase: Phase, soft: &SoftFrame) {
+    fn press(&mut self, sample: &ToolSample, soft: &SoftFrame) {
+        let phase = sample.phase();
         self.loads.contacts.clear();
-        if phase == Phase::Brain {
-            self.step.springs(&mut self.loads.contacts);
-            self.loads.contacts.overflow += self.step.overflow;
+        for (tool, step) in sample.tools().into_iter().zip(&self.steps) {
+            if tool.is_some_and(|tool| Phase::of(&tool.tool) == Phase::Brain) {
+                step.springs(&mut self.loads.contacts);
+                self.loads.contacts.overflow += step.overflow;
+            }
         }
         if let Some(wall) = self.wall.as_mut().filter(|_| self.under_pressure || self.settling.is_open()) {
             wall.press(&soft.positions, phase == Phase::Brain, &mut self.loads.contacts);
@@ -158,9 +173,10 @@ pub struct CollisionStage {
     bleeder: Option<Bleeder>,
     dura: Option<Membrane>,
     wound: Wound,
-    patch: SurfacePatch,
+    /// Of the first hand's tool, and of the second's or an arm's.
+    patches: [SurfacePatch; 2],
+    steps: [TissueStep; 2],
     loads: Loads,
-    step: TissueStep,
     seq: u64,
 }
 
@@ -192,16 +208,27 @@ impl CollisionStage {
             folds: None,
             with_torque: false,
             under_pressure: false,
-            patch: SurfacePatch::default(),
+            patches: Default::default(),
             settling: Settling::default(),
             aspirator: None,
             bleeder: None,
             dura: None,
             wound: Wound::default(),
             loads: Loads { contacts: NodalContacts::with_room(), ..Loads::default() },
-            step: TissueStep::default(),
+            steps: Default::default(),
             seq: 0,
         })
+    }
+
+    /// Adds the tool of a second hand that has a device. Comes before
+    /// [`aspirating`](Self::aspirating).
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_second_hand(mut self, mesh: &TetMesh, config: &Config) -> Result<Self, ConfigError> {
+        let config = Config { shaft: true, ..config.clone() };
+        self.tools.push(TissueCollision::new(mesh, &SecondHand::tool(), &config)?);
+        Ok(self)
     }
 
     /// Adds the contact of the brain with itself once the dura is open.
@@ -319,9 +346,15 @@ impl CollisionStage {
         Some(())
     }
 
-    /// Returns the surface patch for the haptic thread.
+    /// Returns the surface patch of the first hand's tool.
     pub fn patch(&self) -> &SurfacePatch {
-        &self.patch
+        &self.patches[0]
+    }
+
+    /// Returns the surface patches for the haptic thread: of the first hand's tool, and of the
+    /// second hand's or an arm's.
+    pub fn patches(&self) -> &[SurfacePatch; 2] {
+        &self.patches
     }
 
     /// Returns the loads for the solver, without contacts of a tool for bone.
@@ -362,7 +395,8 @@ mod tests {
             let mut state = ToolState::at(Pose::from_translation(Vec3::new(12.3, 12.2, z)));
             (state.time_ms, state.buttons) = (tick as f64, pedal);
             solver.publish(&mut frame);
-            let record = stage.step(&ToolSample { tick, state, tool, slot: 0, drilling: false, second: None }, &frame);
+            let record = stage
+                .step(&ToolSample { tick, state, tool, slot: 0, drilling: false, second: None, idle: false }, &frame);
             let point_mm2 = 4.0 * PI * f64::from(tool.tip_radius_mm).powi(2) / stage.tools[0].points() as f64;
             by_law += if tick > 1 { f64::from(record.points) * point_mm2 * f64::from(RATE) } else { 0.0 };
             most_n = most_n.max(stage.patch().force_n);
@@ -419,7 +453,7 @@ mod tests {
         mesh.tets = mesh.tets.iter().copied().filter(|tet| !is_gap(middle(tet))).collect();
         let tool = Program::Brain.tray()[0];
         let far = ToolState::at(Pose::from_translation(Vec3::splat(100.0)));
-        let sample = ToolSample { tick: 1, state: far, tool, slot: 0, drilling: false, second: None };
+        let sample = ToolSample { tick: 1, state: far, tool, slot: 0, drilling: false, second: None, idle: false };
         // Over 4 mm the arms lean inwards, by 5 mm at the end.
         let closed = |p: &Vec3| *p + Vec3::X * if p.z > 4.0 { (6.0 - p.x).signum() * (p.z - 4.0) * 0.35 } else { 0.0 };
         let frame = |positions: Vec<Vec3>| SoftFrame {

@@ -6,7 +6,7 @@
 //! step. A scalpel cuts while its pedal is down. Once another tool is taken, the leaves are held
 //! back. While it is closed, no tool takes tissue away.
 
-use crate::haptic_tick::ToolSample;
+use crate::haptic_tick::{SecondTool, ToolSample};
 use crate::program::Phase;
 use serde::Serialize;
 use std::sync::Arc;
@@ -81,21 +81,23 @@ impl Membrane {
         !self.is_open()
     }
 
-    /// Goes on to the tool's time, adds the force on the tool to the patch, and keeps account.
-    pub fn step(&mut self, sample: &ToolSample, brain: &[Vec3], patch: &mut SurfacePatch, now: &mut DuraState) {
+    /// Goes on to the tool's time, adds the forces on the tools to their patches, keeps account.
+    pub fn step(&mut self, sample: &ToolSample, brain: &[Vec3], patches: &mut [SurfacePatch; 2], now: &mut DuraState) {
         self.dura.rest_on(brain);
-        let is_tool = sample.phase() == Phase::Brain;
-        if is_tool {
+        if sample.phase() == Phase::Brain {
             self.look_up();
         }
         let is_scalpel = sample.tool.kind == ToolKind::Scalpel;
         if std::mem::replace(&mut self.incised, is_scalpel) && !is_scalpel {
             self.dura.hold_back();
         }
-        let cuts = is_scalpel && sample.state.buttons.has(Buttons::PEDAL);
-        let tip = Tip { at: sample.state.tip(), radius_mm: sample.tool.tip_radius_mm, cuts };
-        let force = self.dura.step(sample.state.time_ms, Some(tip).filter(|_| is_tool));
-        if force != Vec3::ZERO {
+        let tips = sample.tools().map(|tool| {
+            let SecondTool { tool, state, .. } = tool.filter(|tool| Phase::of(&tool.tool) == Phase::Brain)?;
+            let cuts = tool.kind == ToolKind::Scalpel && state.buttons.has(Buttons::PEDAL);
+            Some(Tip { at: state.tip(), radius_mm: tool.tip_radius_mm, cuts })
+        });
+        let forces = self.dura.step(sample.state.time_ms, tips);
+        for (patch, force) in patches.iter_mut().zip(forces).filter(|(_, force)| *force != Vec3::ZERO) {
             let sum = patch.force_n * patch.normal + force;
             let share = patch.force_n / (patch.force_n + force.length()).max(1e-9);
             (patch.normal, patch.force_n) = (sum.normalize_or_zero(), sum.length());
@@ -170,7 +172,7 @@ mod tests {
             let at = way[0].lerp(way[1], (tick - from) as f32 / 999.0);
             let mut state = ToolState::at(Pose::from_translation(at));
             (state.time_ms, state.buttons) = (tick as f64, Buttons::PEDAL);
-            stage.step(&ToolSample { tick, state, tool, slot, drilling: false, second: None }, brain);
+            stage.step(&ToolSample { tick, state, tool, slot, drilling: false, second: None, idle: false }, brain);
             most_n = most_n.max(stage.patch().force_n);
         }
         most_n

@@ -41,6 +41,7 @@ pub mod second_hand;
 pub mod settling;
 pub mod skull_wall;
 pub mod solver_step;
+mod tissue;
 mod tray;
 mod undo;
 

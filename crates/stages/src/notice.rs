@@ -142,6 +142,14 @@ pub enum What {
     NotRedone(Hindrance),
     /// A tool was requested while the present one touches something.
     NotChanged,
+    /// A tool was requested that an arm holds.
+    HeldByArm,
+    /// An arm holds a tool from now on.
+    ArmHolds(Tool),
+    /// The arm was taken away, and its tool with it.
+    ArmGone,
+    /// An arm was requested and has nothing to hold.
+    NoArm(NoArm),
     /// Moving the flap was requested and is not possible now.
     FlapWaits(Hindrance),
     /// Moving a flap was requested where there is no bone.
@@ -167,6 +175,27 @@ pub enum What {
         /// Whether it is the second hand's force.
         second: bool,
     },
+}
+
+/// Reason why an arm does not hold the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoArm {
+    /// It holds blunt tools only.
+    Tool,
+    /// The second hand has a device, and so a tool.
+    SecondHand,
+}
+
+impl NoArm {
+    /// All reasons.
+    pub const ALL: [Self; 2] = [Self::Tool, Self::SecondHand];
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Tool => "an arm holds a spatula or a probe: take one of these first",
+            Self::SecondHand => "no arm holds the tool: the second hand has a tool already",
+        }
+    }
 }
 
 /// Reason why a stroke is not undone.
@@ -280,6 +309,10 @@ impl Notice {
             What::Redone(mm3) => ("redo", format!("the stroke is redone: {mm3:.1} mm3 of bone are gone again")),
             What::NotRedone(why) => ("refused", format!("no stroke is redone: {}", why.text())),
             What::NotChanged => ("refused", format!("the tool stays in the hand: {}", Hindrance::Touches.text())),
+            What::HeldByArm => ("refused", "the arm holds that tool: take the arm away first".into()),
+            What::ArmHolds(tool) => ("arm", format!("an arm holds the {}: draw the hand back", called(&tool))),
+            What::ArmGone => ("arm", "the arm is taken away".into()),
+            What::NoArm(why) => ("refused", why.text().into()),
             What::FlapWaits(why) => ("refused", format!("the flap stays: {}", why.text())),
             What::NoFlap => ("refused", Self::NO_FLAP.into()),
             What::NotOpen => ("refused", Self::NOT_OPEN.into()),

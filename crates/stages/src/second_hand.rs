@@ -1,37 +1,37 @@
-//! One tick of the second hand: an aspirator that touches bone and brain and does not cut.
+//! One tick of the second hand: an aspirator that touches bone and brain and does not cut bone.
 //!
 //! # Theory
 //! ```text
 //! device pose → bone contact (proxy) ──────────╮
-//! brain at rest → d = r - φ(tip), n = ∇φ ──────┴→ force models → force guard → wrench
+//! newest surface patch → tissue depth ─────────┴→ force models → force guard → wrench
 //! ```
 //!
 //! # Practice
 //! Its tick follows the first hand's in the same loop, so that it collides with the bone as the
 //! burr left it in that tick, also in a replay. A tick does not allocate, lock, log or panic.
-//! Contact with the brain uses the rest shape: this hand neither deforms the brain nor feels it
-//! move. The tools of the two hands do not collide.
-//!
-//! # When not to use it
-//! To retract the brain: use the first hand.
+//! It presses the brain and feels it move as the first hand does. Where no brain deforms, contact
+//! uses the rest shape: d = r - φ(tip), n = ∇φ. The tools of the two hands do not collide.
 
 use crate::by_cause;
 use crate::fault::{AfterFault, DeviceStatus, last_valid_state};
 use crate::haptic_config::HapticConfig;
 use crate::notice::{Notice, What};
+use crate::tissue::meet_patch;
 use serde::Serialize;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
-use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench};
-use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
+use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench, SurfacePatch};
+use trepan_geometry::{Buttons, Pose, Tool, ToolState, Twist, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::{SecondRecord, TickRecord};
 use trepan_rigid::{RigidContact, RigidStep};
 use trepan_volume::DistanceField;
 
-/// State of the second hand as it is rendered.
+/// State of the second hand, or of an arm, as it is rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct SecondView {
+    /// The tool.
+    pub tool: Tool,
     /// Pose of the proxy.
     pub world_from_tool: Pose,
     /// Force on the hand, N.
@@ -98,14 +98,17 @@ impl SecondHand {
     pub fn place(&self) -> Option<ToolState> {
         let tool = self.last_valid?;
         let buttons = if self.fault.waits() || self.released { Buttons(0) } else { tool.buttons };
-        Some(ToolState { world_from_tool: self.rigid.proxy(), buttons, ..tool })
+        let twist = if self.step.manifold.touches() { Twist::default() } else { tool.twist };
+        Some(ToolState { world_from_tool: self.rigid.proxy(), buttons, twist, ..tool })
     }
 
-    /// Runs a tick, after the first hand's tick of the same number.
+    /// Runs a tick, after the first hand's tick of the same number, with the newest patch of this
+    /// hand's tool.
     pub fn tick(
         &mut self,
         tick: u64,
         reading: &Reading,
+        patch: &SurfacePatch,
         notify: &mut dyn FnMut(Notice),
     ) -> (GuardedWrench, SecondRecord) {
         let (tool, stale) = last_valid_state(reading, self.last_valid.unwrap_or(ToolState::at(Pose::IDENTITY)));
@@ -114,7 +117,7 @@ impl SecondHand {
             self.rigid.reset(tool.world_from_tool);
         }
         let proxy = self.touch_bone(&tool);
-        self.touch_brain(proxy.translation);
+        self.touch_brain(&ToolState { world_from_tool: proxy, ..tool }, patch);
         let lost = reading.status == Status::Lost;
         if self.config.force_waits {
             let touches = self.step.manifold.touches() || self.tissue.depth_mm > 0.0;
@@ -174,10 +177,15 @@ impl SecondHand {
         self.rigid.proxy()
     }
 
-    fn touch_brain(&mut self, tip: Vec3) {
+    fn touch_brain(&mut self, tool: &ToolState, patch: &SurfacePatch) {
         self.tissue.clear();
         let (Some(brain), Some(_)) = (&self.brain, self.last_valid) else { return };
-        let radius_mm = Self::tool().tip_radius_mm;
+        if self.config.program.has_tissue() {
+            let stiffness = self.config.tissue_force.stiffness;
+            meet_patch(patch, tool, &Self::tool(), stiffness, &mut self.tissue);
+            return;
+        }
+        let (tip, radius_mm) = (tool.tip(), Self::tool().tip_radius_mm);
         let depth_mm = radius_mm - brain.sample(tip);
         let normal = brain.gradient(tip).normalize_or_zero();
         if depth_mm > 0.0 && normal != Vec3::ZERO {
@@ -231,7 +239,7 @@ mod tests {
             let mut tool = ToolState::at(Pose::from_translation(Vec3::Z * (5.0 + share * (z - 5.0))));
             tool.time_ms = f64::from(tick);
             let status = if tick > 300 { status } else { Status::Fresh };
-            last = hand.tick(tick.into(), &Reading { tool, status }, &mut |_| {}).1;
+            last = hand.tick(tick.into(), &Reading { tool, status }, &SurfacePatch::default(), &mut |_| {}).1;
         }
         last
     }
@@ -265,8 +273,8 @@ mod tests {
             for _ in 0..ticks {
                 time_ms += 1.0;
                 let tool = ToolState { buttons, time_ms, ..ToolState::at(Pose::from_translation(Vec3::Z * z)) };
-                let done =
-                    hand.tick(time_ms as u64, &Reading { tool, status }, &mut |notice| notices.push(notice.what));
+                let (reading, mut notify) = (Reading { tool, status }, |notice: Notice| notices.push(notice.what));
+                let done = hand.tick(time_ms as u64, &reading, &SurfacePatch::default(), &mut notify);
                 peak_n = peak_n.max(done.0.force().length());
             }
             peak_n
@@ -288,8 +296,9 @@ mod tests {
     fn there_is_no_force_before_the_devices_first_pose() {
         let mut hand = hand(true);
         let tool = ToolState::at(Pose::from_translation(Vec3::Z * -5.0));
+        let reading = Reading { tool, status: Status::Stale };
         for tick in 1..50 {
-            let (wrench, record) = hand.tick(tick, &Reading { tool, status: Status::Stale }, &mut |_| {});
+            let (wrench, record) = hand.tick(tick, &reading, &SurfacePatch::default(), &mut |_| {});
             assert_eq!((wrench.force(), record.has(TickRecord::STALE)), (Vec3::ZERO, true));
         }
     }

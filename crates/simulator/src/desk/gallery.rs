@@ -8,7 +8,8 @@ use crate::desk::browse::Goal;
 use crate::desk::job::USUAL_S;
 use crate::settings::{Images, Recent, Source};
 use crate::show::notice_text;
-use crate::show::window::{NOT_IN_HAND, SWITCHES, TEACH};
+use crate::show::notice_text::IN_ARM;
+use crate::show::window::{ARM, NOT_IN_HAND, SWITCHES, TEACH};
 use crate::{Inputs, TissueSource};
 use clap::Parser;
 use egui_kittest::Harness;
@@ -17,11 +18,12 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use trepan_geometry::Tool;
 use trepan_gpu::GpuError;
 use trepan_render::Image;
 use trepan_report::training::Lesson;
 use trepan_runtime::lesson::TEACHER_REQUESTS;
-use trepan_stages::notice::{Hindrance, Notice, Warning, What};
+use trepan_stages::notice::{Hindrance, NoArm, Notice, Warning, What};
 use trepan_stages::program::Phase;
 use trepan_window::{Host, Pages, missing, speak, tr};
 
@@ -248,6 +250,8 @@ fn panel_texts() -> Vec<String> {
         What::Undone(1.0),
         What::Redone(1.0),
         What::NotChanged,
+        What::HeldByArm,
+        What::ArmGone,
         What::FlapWaits(Hindrance::Touches),
         What::NoFlap,
         What::NotOpen,
@@ -257,7 +261,8 @@ fn panel_texts() -> Vec<String> {
         What::FlapLifted(1.0),
         What::FlapReturned,
     ];
-    let whats = whats.into_iter().chain(hindrances).chain(tools);
+    let arms = [Tool::spatula(), Tool::probe(2.0)].map(What::ArmHolds).into_iter().chain(NoArm::ALL.map(What::NoArm));
+    let whats = whats.into_iter().chain(hindrances).chain(tools).chain(arms);
     let whats = whats.chain(force.map(|[waits, second]| What::Force { waits, second }));
     let notices = whats.map(|what| Notice { tick: 0, time_ms: 0.0, what }.words().1);
     let tray = Program::Integrated.tray().iter();
@@ -269,7 +274,7 @@ fn panel_texts() -> Vec<String> {
     let loading = USUAL_S.into_iter().map(|(stage, _)| stage.to_string());
     let requests = TEACHER_REQUESTS.into_iter().map(|(_, text)| text.to_string());
     let switches = SWITCHES.into_iter().map(|(text, ..)| text.to_string());
-    let others = [TEACH, NOT_IN_HAND, Notice::NO_FLAP, Notice::NOT_OPEN].map(String::from);
+    let others = [TEACH, NOT_IN_HAND, ARM, IN_ARM, Notice::NO_FLAP, Notice::NOT_OPEN].map(String::from);
     let texts = warnings.into_iter().chain(notices).chain(hints).chain(lessons).chain(loading);
     texts.chain(requests).chain(switches).chain(others).collect()
 }

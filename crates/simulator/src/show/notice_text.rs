@@ -6,6 +6,7 @@ use trepan_report::uncertainty::Band;
 use trepan_runtime::View;
 use trepan_stages::notice::{Notice, Warning};
 use trepan_stages::program::{Phase, Program, called};
+use trepan_stages::second_hand::{SecondHand, SecondView};
 use trepan_window::{Choice, Panel, Sound};
 
 /// Time for which a notice is shown, ms.
@@ -23,6 +24,9 @@ const DANGERS: [Warning; 6] = [
 
 /// Warnings of the operation without harm, after those.
 const CARE: [Warning; 4] = [Warning::BoneThin, Warning::DrillStalled, Warning::CutterJams, Warning::RestsOnBone];
+
+/// What the force on an arm's tool is called.
+pub(crate) const IN_ARM: &str = "tool in the arm";
 
 /// Returns the panel's contents that are common to all sessions.
 pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
@@ -52,7 +56,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     });
     // Only the force of bone is scaled.
     let bone_scale = if sample.phase() == Phase::Brain { 1.0 } else { view.force_scale.0 };
-    let second = view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length())));
+    let of = |second: &SecondView| if second.tool == SecondHand::tool() { "second hand" } else { IN_ARM };
+    let second = view.second.map(|second| value(of(&second), format!("{:.2} N", second.force.length())));
     Panel {
         case: case.into(),
         phase: ["Craniotomy", "Brain"][sample.phase() as usize].into(),
@@ -145,8 +150,15 @@ mod tests {
 
     fn view(warnings: u32) -> View {
         let tool = Program::Integrated.tray()[1];
-        let sample =
-            ToolSample { tick: 1, state: ToolState::at(Pose::IDENTITY), tool, slot: 1, drilling: true, second: None };
+        let sample = ToolSample {
+            tick: 1,
+            state: ToolState::at(Pose::IDENTITY),
+            tool,
+            slot: 1,
+            drilling: true,
+            second: None,
+            idle: false,
+        };
         View { warnings, time_ms: 5000.0, spindle: 0.5, force: Vec3::X, ..View::at(sample, 2.0) }
     }
 

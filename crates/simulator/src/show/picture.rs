@@ -18,7 +18,6 @@ use trepan_runtime::{RenderInputs, Times, View};
 use trepan_stages::DuraState;
 use trepan_stages::collision_step::SoftFrame;
 use trepan_stages::collision_step::Wound;
-use trepan_stages::second_hand::SecondHand;
 use trepan_window::Pace;
 
 /// Half the height of a slice's view around the tool, mm.
@@ -150,7 +149,7 @@ pub(crate) fn frame<'a>(
         brain_paint: colours.brain.as_ref(),
         tool: Some(view.sample.tool),
         world_from_tool: view.sample.state.world_from_tool,
-        second: view.second.map(|second| (SecondHand::tool(), second.world_from_tool)),
+        second: view.second.map(|second| (second.tool, second.world_from_tool)),
         turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },
         drilling: view.sample.drilling,
         overlay: Overlay { force: arrow(view), ..Overlay::default() },

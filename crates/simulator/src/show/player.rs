@@ -24,7 +24,7 @@ use trepan_runtime::film::{Shot, position};
 use trepan_runtime::lockstep::up_to;
 use trepan_runtime::stop::Stop;
 use trepan_stages::program::Program;
-use trepan_stages::second_hand::SecondView;
+use trepan_stages::second_hand::{SecondHand, SecondView};
 use trepan_window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
 
 /// Largest number of voxels and nodes written per picture: some 10 ms.
@@ -220,7 +220,11 @@ impl Player {
         let seconds = &self.recording.second;
         let second =
             seconds.partition_point(|tick| tick.time_ms <= at_ms).checked_sub(1).and_then(|at| seconds.get(at));
-        let held = |tick: &SecondRecord| SecondView { world_from_tool: tick.proxy, force: tick.wrench.force };
+        let held = |tick: &SecondRecord| SecondView {
+            tool: SecondHand::tool(),
+            world_from_tool: tick.proxy,
+            force: tick.wrench.force,
+        };
         View { second: second.map(held).or(view.second), ..view }
     }
 
@@ -254,8 +258,15 @@ mod tests {
     /// View of a tool at the origin.
     fn view(time_ms: f64) -> View {
         let tool = Program::Craniotomy.tray()[0];
-        let sample =
-            ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false, second: None };
+        let sample = ToolSample {
+            tick: 0,
+            state: ToolState::at(Pose::IDENTITY),
+            tool,
+            slot: 0,
+            drilling: false,
+            second: None,
+            idle: false,
+        };
         View { time_ms, ..View::at(sample, 1.0) }
     }
 

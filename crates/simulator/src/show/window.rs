@@ -128,6 +128,13 @@ impl ViewState {
         panel
     }
 
+    /// The operation's own actions: name, key, button.
+    fn actions(&self) -> Vec<(&'static str, char, Buttons)> {
+        let flap = self.bone.then_some(("Lift the flap, or put it back", 'f', Buttons::FLAP));
+        let arm = self.program.has_tissue().then_some((ARM, 'a', Buttons::ARM));
+        flap.into_iter().chain(arm).collect()
+    }
+
     /// Tissue that is gone, ml.
     fn taken_ml(&self, brain: &Shape) -> f64 {
         let taken = |(fill, mm3): (&u16, &f32)| f64::from(u16::MAX - *fill) / f64::from(u16::MAX) * f64::from(*mm3);
@@ -154,6 +161,9 @@ impl ViewState {
         album
     }
 }
+
+/// What the action of the arm is called.
+pub(crate) const ARM: &str = "Leave the tool with an arm, or take the arm away";
 
 /// A live session in the window.
 struct Show {
@@ -327,12 +337,14 @@ impl window::Session for Show {
         });
         let usual = || if teaches { TEACH } else { notice_text::hint(&view.sample.tool, by_hand) }.into();
         let hint = step.unwrap_or_else(usual);
-        let flap = || Action {
-            name: "Lift the flap, or put it back".into(),
-            key: Some('f'),
-            why_not: self.no_flap.then(|| Notice::NO_FLAP.into()),
-            ..Action::default()
+        let no_flap = self.no_flap.then(|| Notice::NO_FLAP.to_string());
+        let action = |(name, key, button): (&str, char, Buttons)| Action {
+            name: name.into(),
+            key: Some(key),
+            why_not: no_flap.clone().filter(|_| button == Buttons::FLAP),
+            on: button == Buttons::ARM && view.second.is_some(),
         };
+        let own = if by_hand { self.shown.actions() } else { Vec::new() };
         let mut panel = self.shown.panel(view, &self.brain, by_hand);
         panel.warnings.extend(lesson.warnings);
         self.raycast.describe(view, &mut panel);
@@ -351,7 +363,7 @@ impl window::Session for Show {
             by_hand,
             rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
             wanted_rate_hz: self.wanted_rate_hz,
-            actions: (by_hand && self.shown.bone).then(flap).into_iter().chain(lesson.actions).collect(),
+            actions: own.into_iter().map(action).chain(lesson.actions).collect(),
             knob: self.knob.as_mut().map(|knob| knob.velocity(1e3 * input.seconds)).unwrap_or_default(),
             leash: by_hand.then(|| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
             finished,
@@ -382,10 +394,11 @@ impl Show {
             input.next_tool.then_some(Buttons::NEXT_TOOL),
             input.undo.then_some(Buttons::UNDO),
             input.redo.then_some(Buttons::REDO),
-            (input.actions & 1 != 0).then_some(Buttons::FLAP),
             input.chosen.map(|[_, slot]| Buttons::slot(slot)),
         ];
-        let active = self.requests.at(input.seconds, buttons.into_iter().flatten());
+        let own = self.shown.actions().into_iter().enumerate();
+        let own = own.filter_map(|(at, (.., button))| (input.actions >> at & 1 != 0).then_some(button));
+        let active = self.requests.at(input.seconds, buttons.into_iter().flatten().chain(own));
         let pedal = if input.pedal { Buttons::PEDAL } else { Buttons(0) };
         pointer.set(input.world_from_tool, active | pedal);
     }
@@ -505,6 +518,7 @@ mod tests {
             slot: 0,
             drilling: false,
             second: None,
+            idle: false,
         };
         let (mut writer, view) = cell(View::at(sample, 1.0));
         let mut show = Show {

@@ -22,7 +22,11 @@
 //! The stage has no clock and no device: the same readings and patches give wrenches equal bit for
 //! bit, live or in a replay. A tick does not allocate, lock, log or panic.
 
+mod arm;
 mod requests;
+
+pub use crate::tissue::{FRESH_MS, GONE_MS};
+pub use arm::SecondTool;
 
 use crate::alarms::{Feed, Pace, WarningInputs};
 use crate::drill::{Drill, REACH_MM, remaining_thickness_mm};
@@ -33,6 +37,7 @@ use crate::haptic_config::HapticConfig;
 use crate::notice::{Notice, Watch, What};
 use crate::program::Phase;
 use crate::score::ScoreKeeper;
+use crate::tissue::meet_patch;
 use crate::tray::Tray;
 use crate::undo::Undo;
 use std::sync::Arc;
@@ -57,7 +62,7 @@ impl HapticStage {
         let desired = self.desired_wrench(&hand, intent, report);
         let wrench = self.guard.guard(desired.sum(), &hand.tool, self.config.dt_ms);
         let record = self.record(input, (&hand, intent, bone, is_held), &sample, (desired, wrench));
-        self.warn(&record, input.patch, &sample, (bone, desired), report);
+        self.warn(&record, input, &sample, (bone, desired), report);
         self.count_hole(bone, report);
         self.scores.add(&record);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
@@ -93,11 +98,6 @@ struct BoneContact {
     came_through: bool,
 }
 
-/// Age up to which a patch gives its full force, ms.
-pub const FRESH_MS: f32 = 10.0;
-/// Age from which a patch gives no force, ms.
-pub const GONE_MS: f32 = 60.0;
-
 /// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct TickInput<'a> {
@@ -111,6 +111,8 @@ pub struct TickInput<'a> {
     pub patch_seq: u64,
     /// The second hand's tool after the last tick; `None` without one.
     pub second: Option<ToolState>,
+    /// Force of the tissue on the tool that an arm holds, N.
+    pub arm_n: f32,
 }
 
 /// The tool as sent to the other threads.
@@ -126,11 +128,19 @@ pub struct ToolSample {
     pub slot: usize,
     /// Whether the tool cuts.
     pub drilling: bool,
-    /// The second hand's tool one tick before; `None` without one.
-    pub second: Option<ToolState>,
+    /// The tool of the second hand, one tick before, or of an arm; `None` without one.
+    pub second: Option<SecondTool>,
+    /// Whether the hand draws back from a tool that it left with an arm: its own does nothing yet.
+    pub idle: bool,
 }
 
 impl ToolSample {
+    /// The tools that act, with their slots: that of the first hand, that of the second.
+    pub fn tools(&self) -> [Option<SecondTool>; 2] {
+        let first = SecondTool { tool: self.tool, slot: self.slot, state: self.state };
+        [Some(first).filter(|_| !self.idle), self.second]
+    }
+
     /// Returns the phase of the present tool.
     pub fn phase(&self) -> Phase {
         Phase::of(&self.tool)
@@ -197,6 +207,7 @@ pub struct HapticStage {
     asked_flap: bool,
     fault: AfterFault,
     released: bool,
+    arm: arm::Arm,
 }
 
 impl HapticStage {
@@ -242,6 +253,7 @@ impl HapticStage {
             asked_flap: false,
             fault: AfterFault::default(),
             released: false,
+            arm: arm::Arm::default(),
         }
     }
 
@@ -325,8 +337,9 @@ impl HapticStage {
     /// Follows the buttons: changes the tool, cuts, undoes and redoes strokes.
     fn follow_requests(&mut self, hand: &Hand, input: &TickInput<'_>, report: &mut dyn FnMut(What)) -> Intent {
         self.change_tool(&hand.tool, input.tick <= 1, report);
+        self.follow_arm(&hand.tool, input, report);
         let drilling = self.drills(&hand.tool);
-        let restored_mm3 = self.undo(&hand.tool, drilling, input.second.map(|tool| tool.world_from_tool), report);
+        let restored_mm3 = self.undo(&hand.tool, drilling, self.second_tool(input), report);
         Intent { drilling, restored_mm3 }
     }
 
@@ -373,26 +386,19 @@ impl HapticStage {
         if self.bone_step.manifold.touches() {
             state.twist = Default::default();
         }
-        let (tick, second) = (input.tick, input.second);
-        let (tool, slot) = (self.tool(), self.tray.slot());
-        ToolSample { tick, state, tool, slot, drilling: intent.drilling, second }
+        let (tick, second) = (input.tick, self.second_tool(input));
+        let (tool, slot, idle) = (self.tool(), self.tray.slot(), self.arm.leaves());
+        ToolSample { tick, state, tool, slot, drilling: intent.drilling, second, idle }
     }
 
     /// Sets the contact with tissue at the present pose; returns whether the patch in contact is
     /// stale.
     fn touch_tissue(&mut self, patch: &SurfacePatch, sample: &ToolSample) -> bool {
-        self.tissue.clear();
-        let age_ms = (sample.state.time_ms - patch.time_ms) as f32;
-        let depth = patch.depth_at(sample.state.tip(), self.config.tissue_force.stiffness);
-        if depth <= 0.0 || !patch.normal.is_finite() {
+        if self.arm.leaves() {
+            self.tissue.clear();
             return false;
         }
-        let share = ((GONE_MS - age_ms) / (GONE_MS - FRESH_MS)).clamp(0.0, 1.0);
-        self.tissue.normal = patch.normal;
-        self.tissue.point = sample.state.tip() - self.tool().tip_radius_mm * patch.normal;
-        self.tissue.depth_mm = depth * share;
-        self.tissue.couple_mm = patch.couple_mm;
-        age_ms > FRESH_MS
+        meet_patch(patch, &sample.state, &self.tool(), self.config.tissue_force.stiffness, &mut self.tissue)
     }
 
     /// Returns the desired wrenches; none after a fault or during a pause. Tissue has one in the
@@ -483,12 +489,12 @@ impl HapticStage {
     fn warn(
         &mut self,
         record: &TickRecord,
-        patch: &SurfacePatch,
+        &TickInput { patch, arm_n, .. }: &TickInput<'_>,
         sample: &ToolSample,
         (bone, desired): (BoneContact, DesiredWrench),
         report: &mut dyn FnMut(What),
     ) {
-        let inputs = self.warning_inputs(record, sample, bone.ahead_mm, patch, desired);
+        let inputs = self.warning_inputs(record, sample, bone.ahead_mm, patch, (desired, arm_n));
         for (warning, present, value) in inputs.causes(record, &self.config.limits) {
             self.watch.update(warning, present, value, record.time_ms).into_iter().for_each(&mut *report);
         }
@@ -501,7 +507,7 @@ impl HapticStage {
         sample: &ToolSample,
         ahead_mm: f32,
         patch: &SurfacePatch,
-        desired: DesiredWrench,
+        (desired, arm_n): (DesiredWrench, f32),
     ) -> WarningInputs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
@@ -511,7 +517,7 @@ impl HapticStage {
             craniotome,
             ahead_mm,
             breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
-            tissue_n: record.tissue_n(),
+            tissue_n: record.tissue_n().max(arm_n),
             rest_n: if phase == Phase::Brain { desired.bone.force.length() } else { 0.0 },
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
             desired_n: desired.sum().force.length(),

@@ -1,11 +1,10 @@
 //! Requests by buttons: cutting, changing the tool, undoing a stroke, moving the flap.
 
-use super::HapticStage;
+use super::{HapticStage, SecondTool};
 use crate::drill::Drill;
 use crate::flap::Flap;
 use crate::notice::{Hindrance, What};
 use crate::program::Phase;
-use crate::second_hand::SecondHand;
 use crate::tray::Change;
 use crate::undo::{Answer, Place, Stroke};
 use glam::IVec3;
@@ -66,17 +65,13 @@ impl HapticStage {
     /// phase and tool.
     pub(super) fn change_tool(&mut self, tool: &ToolState, is_first: bool, report: &mut dyn FnMut(What)) {
         let before = self.phase();
-        let change = self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open());
+        let change =
+            self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open(), self.arm.slot());
         match change {
             Some(Change::Refused) => report(What::NotOpen),
             Some(Change::Busy) => report(What::NotChanged),
-            Some(Change::Taken) => {
-                if let Some(rigid) = &mut self.rigid[self.tray.slot()] {
-                    rigid.reset(self.proxy);
-                }
-                self.drill = Drill::default();
-                self.bone.iter().for_each(|bone| bone.end_stroke());
-            }
+            Some(Change::Held) => report(What::HeldByArm),
+            Some(Change::Taken) => self.begin_tool(),
             None => {}
         }
         if is_first || before != self.phase() {
@@ -85,6 +80,15 @@ impl HapticStage {
         if is_first || change == Some(Change::Taken) {
             report(What::Taken(self.tool()));
         }
+    }
+
+    /// Begins with the tool that was taken, where the last one was.
+    pub(super) fn begin_tool(&mut self) {
+        if let Some(rigid) = &mut self.rigid[self.tray.slot()] {
+            rigid.reset(self.proxy);
+        }
+        self.drill = Drill::default();
+        self.bone.iter().for_each(|bone| bone.end_stroke());
     }
 
     /// Runs the tick of the flap.
@@ -110,13 +114,13 @@ impl HapticStage {
         }
     }
 
-    /// Begins, ends, undoes and redoes strokes; `second` is the pose of the second hand's tool.
+    /// Begins, ends, undoes and redoes strokes; `second` is the second hand's tool.
     /// Returns the restored bone, mm³, negative for a redo.
     pub(super) fn undo(
         &mut self,
         tool: &ToolState,
         drilling: bool,
-        second: Option<Pose>,
+        second: Option<SecondTool>,
         report: &mut dyn FnMut(What),
     ) -> f32 {
         let hinders = self.hinders_undo(tool);
@@ -129,7 +133,7 @@ impl HapticStage {
         let place = |tool, world_from_tool, hindrance| Place { tool, world_from_tool, hindrance };
         let tools = [
             Some(place(self.tray.tool(), self.proxy, Hindrance::Tool)),
-            second.map(|pose| place(SecondHand::tool(), pose, Hindrance::SecondTool)),
+            second.map(|other| place(other.tool, other.state.world_from_tool, Hindrance::SecondTool)),
         ];
         let moved = self.undo.runs();
         let pressed = [Buttons::UNDO, Buttons::REDO].map(|button| tool.buttons.has(button));

@@ -84,6 +84,7 @@ fn retraction(brain: &RestBrain, entry: Vec3, inward: Vec3) -> Result<Row> {
         slot: SPATULA,
         drilling: false,
         second: None,
+        idle: false,
     };
     let codes = brain.class_of_tet.iter().map(|code| code - 1).collect();
     let (mut solver, mut frame, mut seq) = (solver(brain, codes)?, SoftFrame::default(), 0);
@@ -148,8 +149,10 @@ fn press(brain: &RestBrain, tumour: Option<Vec3>, entry: Vec3, inward: Vec3) -> 
     let end = (1e3 * (DEPTH_MM + 1.0) / PRESS_MM_S) as u64 + 500;
     for tick in 1..=end {
         let reading = Reading { tool: at(tick as f64), status: Status::Fresh };
-        let done = haptic
-            .tick(&TickInput { tick, reading, patch: collision.patch(), patch_seq: seq, second: None }, &mut |_| {});
+        let done = haptic.tick(
+            &TickInput { tick, reading, patch: collision.patch(), patch_seq: seq, second: None, arm_n: 0.0 },
+            &mut |_| {},
+        );
         solver.publish(&mut frame);
         seq = collision.step(&done.sample, &frame).seq;
         while solver.time_ms() < tick as f64 {
