@@ -15,6 +15,10 @@ fn a_script_passes_every_lesson() {
             ("resect", include_str!("../../../crates/report/lessons/6-resect.json")),
         ),
         ("script:bleed --duration 60", ("bleeding", include_str!("../../../crates/report/lessons/7-bleeding.json"))),
+        (
+            "script:arm --duration 60 --aspiration 50 --csf-loss 0",
+            ("arm", include_str!("../../../crates/report/lessons/9-arm.json")),
+        ),
     ];
     passing::all_pass(env!("CARGO_BIN_EXE_brain"), &lessons);
 }

@@ -27,6 +27,7 @@ pub mod printable;
 pub mod regions;
 pub mod slicer;
 pub mod summary;
+pub mod tool_use;
 pub mod training;
 pub mod uncertainty;
 pub mod whole;

@@ -4,7 +4,7 @@ use crate::ReportError;
 use crate::debrief::Debrief;
 use crate::drilled::{self, Drilled};
 use crate::page::{self, Shot};
-use crate::summary::Summary;
+use crate::summary::{Resection, Summary};
 use crate::whole::whole;
 use crate::{csv, slicer};
 use std::collections::BTreeMap;
@@ -220,12 +220,26 @@ fn scores(summary: &Summary) -> String {
         ("scores", serde_json::to_value(summary.scores)),
         ("plan", serde_json::to_value(summary.plan)),
         ("cut_off", serde_json::to_value(summary.cut_off)),
+        ("bleeding", serde_json::to_value(&summary.bleeding)),
+        ("dura", serde_json::to_value(&summary.dura)),
+        ("both_hands", serde_json::to_value(summary.tool_use.both_hands)),
     ];
     let mut csv = format!("name,value\n{about}");
     for (part, value) in parts {
         for (name, value) in value.ok().as_ref().and_then(|value| value.as_object()).into_iter().flatten() {
             let value = if value.is_null() { String::new() } else { value.to_string() };
             _ = writeln!(csv, "{part}.{name},{value}");
+        }
+    }
+    if let Some(Resection { tumour_share, healthy_mm3, .. }) = summary.resection {
+        _ = writeln!(csv, "resection.tumour_share,{tumour_share}\nresection.healthy_mm3,{healthy_mm3}");
+    }
+    for of in &summary.tool_use.tools {
+        let name = of.name.replace(", ", "_").replace(' ', "_");
+        for (key, value) in serde_json::to_value(of).ok().as_ref().and_then(|of| of.as_object()).into_iter().flatten() {
+            if key != "name" {
+                _ = writeln!(csv, "tools.{name}.{key},{value}");
+            }
         }
     }
     for region in &summary.regions {

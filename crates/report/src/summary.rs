@@ -2,6 +2,7 @@
 
 use crate::models::ModelSummary;
 use crate::regions::Region;
+use crate::tool_use::ToolUses;
 use crate::uncertainty::Bands;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -89,6 +90,8 @@ pub struct Summary {
     pub plan: Option<PlanComparison>,
     /// Regions of the brain that were pressed, largest impulse first.
     pub regions: Vec<Region>,
+    /// How the tools for the brain were used.
+    pub tool_use: ToolUses,
     /// Ticks in which the force guard acted, by cause.
     #[serde(serialize_with = "by_cause")]
     pub guard: GuardCounters,

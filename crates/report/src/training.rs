@@ -75,6 +75,8 @@ pub enum Measure {
     TakenMl,
     /// Blood that comes, ml/min.
     BleedsMlPerMin,
+    /// Length of all incisions of the dura, mm.
+    IncisedMm,
     /// Place of the tool in the tray.
     Slot,
     /// Nothing: the last step.
@@ -103,7 +105,7 @@ fn bone_programs() -> Vec<String> {
 }
 
 /// Lessons of the programs.
-const OWN: [&str; 7] = [
+const OWN: [&str; 9] = [
     include_str!("../lessons/1-first-operation.json"),
     include_str!("../lessons/2-straight-through.json"),
     include_str!("../lessons/3-flap.json"),
@@ -111,6 +113,8 @@ const OWN: [&str; 7] = [
     include_str!("../lessons/5-retract.json"),
     include_str!("../lessons/6-resect.json"),
     include_str!("../lessons/7-bleeding.json"),
+    include_str!("../lessons/8-dura.json"),
+    include_str!("../lessons/9-arm.json"),
 ];
 
 impl Lesson {
@@ -153,7 +157,7 @@ impl Lesson {
 
 impl Step {
     /// Whether a running session has reached the target.
-    fn is_reached(&self, view: &View, [taken_ml, ml_per_min]: [f64; 2]) -> bool {
+    fn is_reached(&self, view: &View, [taken_ml, ml_per_min, incised_mm]: [f64; 3]) -> bool {
         let value = match self.until {
             Measure::BoneDepthMm => view.depth_mm[0].into(),
             Measure::TissueDepthMm => view.depth_mm[1].into(),
@@ -164,6 +168,7 @@ impl Step {
             Measure::ForceN => view.force.length().into(),
             Measure::TakenMl => taken_ml,
             Measure::BleedsMlPerMin => ml_per_min,
+            Measure::IncisedMm => incised_mm,
             Measure::Slot => view.sample.slot as f64,
             Measure::Never => return false,
         };
@@ -210,8 +215,9 @@ impl Guide {
     }
 
     /// Goes on to the next step once the present one is reached; returns the text of the present
-    /// one. `wound`: tissue taken by the aspirator, ml, and blood that comes, ml/min.
-    pub fn follow(&mut self, view: &View, wound: [f64; 2]) -> String {
+    /// one. `wound`: tissue taken by the aspirator, ml, blood that comes, ml/min, and how long the
+    /// dura is incised, mm.
+    pub fn follow(&mut self, view: &View, wound: [f64; 3]) -> String {
         let count = self.lesson.steps.len();
         if self.lesson.steps.get(self.at).is_some_and(|step| step.is_reached(view, wound)) && self.at + 1 < count {
             self.at += 1;
@@ -243,9 +249,9 @@ mod tests {
     #[test]
     fn a_program_has_its_own_lessons_only() {
         let names = |program| Lesson::of(program, None).into_iter().map(|lesson| lesson.name).collect::<Vec<_>>();
-        assert_eq!(names(Program::Brain), ["press", "retract", "resect", "bleeding"]);
+        assert_eq!(names(Program::Brain), ["press", "retract", "resect", "bleeding", "arm"]);
         assert_eq!(names(Program::Craniotomy), ["first-operation", "through", "flap"]);
-        assert_eq!(names(Program::Integrated), names(Program::Craniotomy));
+        assert_eq!(names(Program::Integrated), [names(Program::Craniotomy), vec!["dura".into()]].concat());
         for lesson in Lesson::all(None) {
             let programs = [Program::Craniotomy, Program::Brain, Program::Integrated];
             let of = programs.into_iter().filter(|program| lesson.programs.iter().any(|name| name == program.name()));
@@ -261,7 +267,7 @@ mod tests {
         let sample = ToolSample { tick: 0, state, tool, slot: 3, drilling: false, second: None, idle: false };
         let mut guide = Guide::new(Lesson::all(None).remove(2));
         let mut view = View { removed_mm3: 5000.0, ..View::at(sample, 1.0) };
-        let mut text = |view: &View| (0..9).map(|_| guide.follow(view, [0.0; 2])).last().unwrap_or_default();
+        let mut text = |view: &View| (0..9).map(|_| guide.follow(view, [0.0; 3])).last().unwrap_or_default();
         assert!(text(&view).starts_with("Step 3"), "half a lap is no flap");
         view.flap = FlapPlace::Free;
         assert!(text(&view).contains("Lift the flap"));
@@ -283,12 +289,24 @@ mod tests {
         };
         let mut view = View::at(sample, 1.0);
         let mut guide = Guide::new(Lesson::all(None).remove(0));
-        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 1 of 6"));
+        assert!(guide.follow(&view, [0.0, 0.0, 0.0]).starts_with("Step 1 of 6"));
         view.depth_mm[0] = 0.1;
-        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 2"));
-        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 2"), "nothing is removed yet");
+        assert!(guide.follow(&view, [0.0, 0.0, 0.0]).starts_with("Step 2"));
+        assert!(guide.follow(&view, [0.0, 0.0, 0.0]).starts_with("Step 2"), "nothing is removed yet");
         view.removed_mm3 = 50.0;
-        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 3"));
+        assert!(guide.follow(&view, [0.0, 0.0, 0.0]).starts_with("Step 3"));
+    }
+
+    #[test]
+    fn the_lesson_of_the_dura_goes_on_with_its_incision() {
+        let lesson = Lesson::all(None).into_iter().find(|lesson| lesson.name == "dura").unwrap();
+        let scalpel = lesson.steps.iter().position(|step| step.until == Measure::IncisedMm).unwrap();
+        let (state, tool) = (ToolState::at(Pose::IDENTITY), Program::Integrated.tray()[8]);
+        let sample = ToolSample { tick: 0, state, tool, slot: 8, drilling: false, second: None, idle: false };
+        let mut guide = Guide { lesson, at: scalpel };
+        let view = View::at(sample, 1.0);
+        assert!(guide.follow(&view, [0.0, 0.0, 11.9]).contains("draw a line across"));
+        assert!(guide.follow(&view, [0.0, 0.0, 12.0]).contains("Take the probe"));
     }
 
     #[test]
@@ -306,10 +324,10 @@ mod tests {
         let (view, lesson) = (View::at(sample, 1.0), Lesson::all(None).remove(5));
         assert_eq!(lesson.tumour_mm, Some(7.5));
         let mut guide = Guide::new(lesson);
-        assert!(guide.follow(&view, [0.0, 0.0]).starts_with("Step 1 of 5"));
-        assert!(guide.follow(&view, [0.1, 0.0]).starts_with("Step 2"));
-        assert!(guide.follow(&view, [0.1, 0.0]).starts_with("Step 2"));
-        assert!(guide.follow(&view, [0.9, 0.0]).starts_with("Step 3"));
+        assert!(guide.follow(&view, [0.0, 0.0, 0.0]).starts_with("Step 1 of 5"));
+        assert!(guide.follow(&view, [0.1, 0.0, 0.0]).starts_with("Step 2"));
+        assert!(guide.follow(&view, [0.1, 0.0, 0.0]).starts_with("Step 2"));
+        assert!(guide.follow(&view, [0.9, 0.0, 0.0]).starts_with("Step 3"));
     }
 
     #[test]

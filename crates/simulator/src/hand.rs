@@ -90,7 +90,7 @@ fn script_s(name: &str, plan: &Plan) -> f64 {
     match (name, plan.target) {
         ("flap", _) => 75.0,
         ("bleed", _) => 150.0 + incises_s,
-        ("resect", target) => {
+        ("resect" | "arm", target) => {
             60.0 + incises_s
                 + target.map_or(60.0, |target| {
                     f64::from(target.radius_mm).powi(2) * (0.43 * f64::from(target.radius_mm) + 2.0)
@@ -129,7 +129,7 @@ pub(crate) fn second_name(first: &DeviceName, options: &Options) -> Result<Optio
 }
 
 fn unfit(name: &DeviceName) -> SessionError {
-    let known = "script:aspirate, simulated:NAME, or a device that --list-devices shows";
+    let known = "script:aspirate, script:suck, simulated:NAME, or a device that --list-devices shows";
     second(format!("the second hand cannot hold {name}: give {known}"))
 }
 

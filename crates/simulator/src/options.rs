@@ -41,7 +41,7 @@ pub struct Options {
     /// Haptic device, by name
     #[arg(help_heading = "Haptic devices", long, value_name = "DEVICE", value_parser = device, help = format!("Haptic device: {} [default: mouse with a window, else a script]", trepan_haptics::usage()))]
     pub device: Option<String>,
-    /// Device of the second hand, which holds an aspirator: script:aspirate, simulated:NAME, or a
+    /// Device of the second hand, which holds an aspirator: script:suck, simulated:NAME, or a
     /// device that --list-devices shows
     #[arg(help_heading = "Haptic devices", long, value_name = "DEVICE", value_parser = device, conflicts_with = "watch")]
     pub second_device: Option<String>,

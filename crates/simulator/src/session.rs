@@ -35,7 +35,7 @@ use trepan_report::page::Shot;
 use trepan_report::printable::printable;
 use trepan_report::summary::{CutOff, Machine, Opening, SecondSummary, SolverSummary, Summary, fps};
 use trepan_report::training::{Guide, Lesson};
-use trepan_report::{film, output, slicer};
+use trepan_report::{film, output, slicer, tool_use};
 use trepan_runtime::film::{self as filmed, Filming};
 use trepan_runtime::lesson::{Teacher, TeacherButtons};
 use trepan_runtime::lockstep;
@@ -257,6 +257,7 @@ impl Session {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
             plan: self.setup.bone().and_then(|bone| PlanComparison::of(&self.setup.plan, bone)),
             regions: self.setup.regions(&recording),
+            tool_use: tool_use::tool_use(self.program.tray(), &recording),
             resection: self.setup.resection(&solver.fills),
             remarks,
             machine: Machine::here(adapter),

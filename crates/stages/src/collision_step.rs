@@ -5,7 +5,7 @@
 //! With a tool for bone the result only causes warnings: the patch goes to the haptic thread, the
 //! solver gets no contact of it (thesis 6.4). A tool for the brain collides with tip and shaft, and
 //! so does that of the second hand or of an arm. From its first use on, the skull supports the
-//! brain against the probe and its own weight; under surface pressure it does so from the start. The
+//! brain against the probe and its own weight; under surface pressure it does so at once. The
 //! stage has no clock; the same tools and positions give the same results.
 
 use crate::aspirator::Aspirator;

@@ -281,6 +281,8 @@ pub struct Notice {
 impl Notice {
     /// Why no flap moves.
     pub const NO_FLAP: &'static str = "no bone is drilled here, so none can be lifted";
+    /// Why a tool that an arm holds is not taken.
+    pub const IN_ARM: &'static str = "the arm holds that tool: take the arm away first";
     /// Why no tool for the brain is taken.
     pub const NOT_OPEN: &'static str = "the bone is not open: drill through it or lift the flap first";
 
@@ -309,7 +311,7 @@ impl Notice {
             What::Redone(mm3) => ("redo", format!("the stroke is redone: {mm3:.1} mm3 of bone are gone again")),
             What::NotRedone(why) => ("refused", format!("no stroke is redone: {}", why.text())),
             What::NotChanged => ("refused", format!("the tool stays in the hand: {}", Hindrance::Touches.text())),
-            What::HeldByArm => ("refused", "the arm holds that tool: take the arm away first".into()),
+            What::HeldByArm => ("refused", Self::IN_ARM.into()),
             What::ArmHolds(tool) => ("arm", format!("an arm holds the {}: draw the hand back", called(&tool))),
             What::ArmGone => ("arm", "the arm is taken away".into()),
             What::NoArm(why) => ("refused", why.text().into()),

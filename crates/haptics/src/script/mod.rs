@@ -32,13 +32,26 @@ use trepan_geometry::{ToolState, Wrench};
 
 /// The names of the operations that [`Script::named`] knows.
 ///
-/// `aspirate` is for the second hand: its tool approaches beside the burr and rests on the bone.
+/// `aspirate` and `suck` are for the second hand: its tool approaches beside the burr and rests on
+/// the bone, or takes some of the brain away while the first hand does `retract`. `arm` leaves the
+/// spatula with an arm and takes a ball of tissue away beside it.
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
 /// minute. `press` and `retract` hold the brain aside with the probe and with the spatula. `resect`
 /// opens a flap, takes a ball of tissue away with the aspirator, layer by layer, and goes around
 /// the wound with the bipolar; `bleed` does so with a small ball.
-pub const NAMES: [&str; 9] =
-    ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap", "press", "retract", "resect", "bleed"];
+pub const NAMES: [&str; 11] = [
+    "craniotomy-and-probe",
+    "craniotomy",
+    "probe",
+    "aspirate",
+    "suck",
+    "flap",
+    "press",
+    "retract",
+    "arm",
+    "resect",
+    "bleed",
+];
 
 /// A script could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -236,6 +249,16 @@ mod tests {
         }
         let deepest = ticks(&aspirator).map(|tool| depth(&site, &tool)).fold(f32::MIN, f32::max);
         assert!(deepest + plan.aspirator_radius_mm > 0.4, "it touches: {deepest}");
+    }
+
+    #[test]
+    fn the_second_hand_sucks_beside_the_spatula_that_holds_the_brain_aside() {
+        let site = site();
+        let [spatula, tube] = ["retract", "suck"].map(|name| Script::named(name, &site, 60_000.0).unwrap());
+        let sucks: Vec<usize> = (0..60_000).filter(|&ms| tube.at(ms as f64).buttons.has(Buttons::PEDAL)).collect();
+        assert!(sucks.len() > 10_000 && sucks[0] > 30_000, "{} from {}", sucks.len(), sucks[0]);
+        let nearest = sucks.iter().map(|&ms| tube.at(ms as f64).tip().distance(spatula.at(ms as f64).tip()));
+        assert!(nearest.fold(f32::MAX, f32::min) > 1.5, "the tube is not where the spatula is");
     }
 
     #[test]

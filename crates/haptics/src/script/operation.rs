@@ -175,6 +175,8 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
     let start = site.below(-plan.start_mm);
     let (start, rotation, moves) = match name {
         "aspirate" => aspirate(site, plan),
+        "suck" => (start, upright, suck(site, plan)),
+        "arm" => (start, upright, arm(site, plan)),
         "flap" => {
             let (start, moves) = flap(site, plan);
             (start, upright, moves)
@@ -368,6 +370,33 @@ fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
         }
     }
     moves.extend([Move("draw back", 4.0, top, HANDS_OFF), Move("leave", 4.0, away, HANDS_OFF)]);
+    moves
+}
+
+/// Waits until `retract` holds the brain aside, and takes a small ball of it away.
+fn suck(site: &Site, plan: &Plan) -> Vec<Move> {
+    let small = Target { centre: site.below(site.brain_mm + 1.5), radius_mm: 3.5, sinks_mm: 0.0 };
+    let mut moves = resect(site, &Plan { target: Some(small), ..plan.clone() });
+    let whole: f64 = moves.iter().map(|each| each.1).sum();
+    moves.iter_mut().for_each(|each| each.1 /= whole);
+    moves[0] = Move("wait", 1.0, site.below(-plan.start_mm), HANDS_OFF);
+    moves
+}
+
+/// Presses the spatula beside the target, leaves it with an arm, and takes the target away.
+fn arm(site: &Site, plan: &Plan) -> Vec<Move> {
+    let (target, top) = target(site, plan);
+    let aside = (target.radius_mm + plan.spatula_radius_mm + 2.0) * site.inward.any_orthonormal_vector();
+    let over = top + aside;
+    let deep = over + (plan.retract_mm[0] + 1.0) * site.inward;
+    let mut moves = vec![
+        Move("take the spatula", 1.5, site.below(-plan.start_mm), Buttons::take(ToolKind::Spatula)),
+        Move("approach with the spatula", 6.0, over, HANDS_OFF),
+        Move("press", 5.0, deep, HANDS_OFF),
+        Move("leave it with an arm", 1.0, deep, Buttons::ARM),
+        Move("draw back", 4.0, over - 10.0 * site.inward, HANDS_OFF),
+    ];
+    moves.extend(resect(site, plan).into_iter().skip(1));
     moves
 }
 

@@ -96,7 +96,9 @@ fn news(view: &View) -> Vec<String> {
 fn tray(program: Program, view: &View) -> Choice {
     let closed =
         |tool: &Tool| Phase::of(tool) == Phase::Brain && view.sample.phase() != Phase::Brain && !view.bone_open;
-    let why_not = |tool: &Tool| closed(tool).then(|| Notice::NOT_OPEN.into());
+    let held = |tool: &Tool| view.second.is_some_and(|second| second.tool == *tool && *tool != SecondHand::tool());
+    let in_arm = |tool: &Tool| held(tool).then(|| Notice::IN_ARM.to_string());
+    let why_not = |tool: &Tool| closed(tool).then(|| Notice::NOT_OPEN.into()).or_else(|| in_arm(tool));
     let options = program.tray().iter().map(|tool| (called(tool), why_not(tool))).collect();
     Choice { name: "Tool".into(), options, chosen: view.sample.slot, tools: program.tray().to_vec() }
 }

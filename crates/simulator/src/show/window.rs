@@ -333,7 +333,9 @@ impl window::Session for Show {
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let step = self.guide.as_mut().map(|guide| {
-            guide.follow(view, [self.shown.taken_ml(&self.brain), self.brain.wound.bleeding.rate_ml_per_min.into()])
+            let Wound { bleeding, dura } = &self.brain.wound;
+            let taken_ml = self.shown.taken_ml(&self.brain);
+            guide.follow(view, [taken_ml, bleeding.rate_ml_per_min.into(), dura.incised_mm.into()])
         });
         let usual = || if teaches { TEACH } else { notice_text::hint(&view.sample.tool, by_hand) }.into();
         let hint = step.unwrap_or_else(usual);

@@ -65,11 +65,13 @@ impl HapticStage {
             None if !is_blunt => report(What::NoArm(NoArm::Tool)),
             None => {
                 self.hold(self.tray.slot(), self.proxy, tool.time_ms);
-                report(What::ArmHolds(self.tool()));
+                let held = self.tool();
                 self.tray.leave(ToolKind::Aspirator);
                 self.begin_tool();
                 self.arm.leaves_ms = Some(tool.time_ms);
                 report(What::Taken(self.tool()));
+                // Last, as the newest notice is shown.
+                report(What::ArmHolds(held));
             }
         }
     }
