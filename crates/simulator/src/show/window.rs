@@ -26,6 +26,7 @@ use trepan_runtime::stop::Stop;
 use trepan_runtime::watch::{PeerSession, Watching};
 use trepan_runtime::{RenderInputs, View};
 use trepan_stages::Bleeding;
+use trepan_stages::collision_step::Wound;
 use trepan_stages::notice::Notice;
 use trepan_stages::program::Program;
 use trepan_window::{self as window, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
