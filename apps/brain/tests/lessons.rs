@@ -9,6 +9,11 @@ fn a_script_passes_every_lesson() {
     let lessons = [
         ("script:press", ("press", include_str!("../../../crates/report/lessons/4-press.json"))),
         ("script:retract", ("retract", include_str!("../../../crates/report/lessons/5-retract.json"))),
+        // A second hand that sucks beside the spatula changes nothing in the first one's marks.
+        (
+            "script:retract --second-device script:suck",
+            ("retract", include_str!("../../../crates/report/lessons/5-retract.json")),
+        ),
         // A script does not see where the tumour sinks to, and need not be slow.
         (
             "script:resect --duration 45 --aspiration 50 --csf-loss 0",

@@ -99,7 +99,8 @@ impl SecondHand {
         let tool = self.last_valid?;
         let buttons = if self.fault.waits() || self.released { Buttons(0) } else { tool.buttons };
         let twist = if self.step.manifold.touches() { Twist::default() } else { tool.twist };
-        Some(ToolState { world_from_tool: self.rigid.proxy(), buttons, twist, ..tool })
+        let world_from_tool = if self.bone.is_some() { self.rigid.proxy() } else { tool.world_from_tool };
+        Some(ToolState { world_from_tool, buttons, twist, ..tool })
     }
 
     /// Runs a tick, after the first hand's tick of the same number, with the newest patch of this
@@ -290,6 +291,13 @@ mod tests {
         assert!(run(300, 0.8, Buttons(0), Status::Fresh) > 0.5);
         let waits: Vec<What> = [true, false, true, false].map(|waits| What::Force { waits, second: true }).into();
         assert_eq!(notices, waits);
+    }
+
+    #[test]
+    fn its_tool_follows_the_device_where_there_is_no_bone() {
+        let mut hand = hand(false);
+        lowered(&mut hand, -9.0, Status::Fresh);
+        assert_eq!(hand.place().unwrap().tip(), Vec3::Z * -9.0);
     }
 
     #[test]

@@ -373,9 +373,10 @@ fn resect(site: &Site, plan: &Plan) -> Vec<Move> {
     moves
 }
 
-/// Waits until `retract` holds the brain aside, and takes a small ball of it away.
+/// Waits until `retract` holds the brain aside, and takes a small ball of it away, as deep as the
+/// spatula may have drawn it.
 fn suck(site: &Site, plan: &Plan) -> Vec<Move> {
-    let small = Target { centre: site.below(site.brain_mm + 1.5), radius_mm: 3.5, sinks_mm: 0.0 };
+    let small = Target { centre: site.below(site.brain_mm + 1.5), radius_mm: 3.5, sinks_mm: 8.0 };
     let mut moves = resect(site, &Plan { target: Some(small), ..plan.clone() });
     let whole: f64 = moves.iter().map(|each| each.1).sum();
     moves.iter_mut().for_each(|each| each.1 /= whole);
@@ -388,7 +389,7 @@ fn arm(site: &Site, plan: &Plan) -> Vec<Move> {
     let (target, top) = target(site, plan);
     let aside = (target.radius_mm + plan.spatula_radius_mm + 2.0) * site.inward.any_orthonormal_vector();
     let over = top + aside;
-    let deep = over + (plan.retract_mm[0] + 1.0) * site.inward;
+    let deep = over + (2.0 * plan.retract_mm[0] + 1.0) * site.inward;
     let mut moves = vec![
         Move("take the spatula", 1.5, site.below(-plan.start_mm), Buttons::take(ToolKind::Spatula)),
         Move("approach with the spatula", 6.0, over, HANDS_OFF),
