@@ -5,5 +5,5 @@
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
 @fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
-    return vec4f(textureLoad(seen, vec2i(pixel.xy), 0).xyz, scene.spin.w);
+    return vec4f(textureLoad(seen, vec2i(pixel.xy), 0).xyz, scene.steps.z);
 }

@@ -89,7 +89,7 @@ fn enter_drilled(c: Corners, cell: vec3i, a: vec3f, b: vec3f, begin: f32) -> f32
     let first = drilled_brick(cell);
     if first < 0 { return begin; }
     // The segment on the lattice of the brick.
-    let steps = scene.tips.z;
+    let steps = scene.steps.x;
     let low = steps * vec3f(cell % 4);
     let o = low + steps * a;
     let d = steps * (b - a);

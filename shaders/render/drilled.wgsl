@@ -20,7 +20,7 @@ fn drilled_brick(cell: vec3i) -> i32 {
     let bricks = (vec3i(scene.dims.xyz) + 2) / 4;
     let brick = cell / 4;
     let place = i32(drilled_table[brick.x + bricks.x * (brick.y + bricks.y * brick.z)]);
-    let edge = 4 * i32(scene.tips.z) + 1;
+    let edge = 4 * i32(scene.steps.x) + 1;
     return (place - 1) * ((edge * edge * edge + 1) / 2);
 }
 
@@ -30,7 +30,7 @@ fn drilled_value(first: i32, at: i32) -> f32 {
 
 // Depths at the corners of the lattice's cell at `at` in the brick, nodes.
 fn drilled_corners(first: i32, at: vec3i) -> Corners {
-    let y = 4 * i32(scene.tips.z) + 1;
+    let y = 4 * i32(scene.steps.x) + 1;
     let z = y * y;
     let n = at.x + y * at.y + z * at.z;
     let low = vec4f(drilled_value(first, n), drilled_value(first, n + 1),
@@ -45,8 +45,8 @@ fn drilled(g: vec3f) -> f32 {
     let cell = clamp(vec3i(floor(g)), vec3i(0), vec3i(scene.dims.xyz) - 2);
     let first = drilled_brick(cell);
     if first < 0 { return FAR; }
-    let last = 4.0 * scene.tips.z;
-    let at = clamp((g - 4.0 * vec3f(cell / 4)) * scene.tips.z, vec3f(0.0), vec3f(last));
+    let last = 4.0 * scene.steps.x;
+    let at = clamp((g - 4.0 * vec3f(cell / 4)) * scene.steps.x, vec3f(0.0), vec3f(last));
     let low = min(floor(at), vec3f(last - 1.0));
     let c = drilled_corners(first, vec3i(low));
     return blend(c.low, c.high, at - low);

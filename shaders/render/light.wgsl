@@ -14,7 +14,7 @@ fn pass_by(gap: f32, way: f32) -> f32 { return smoothstep(-1.0, 1.0, gap / (0.10
 
 // Fraction of light that the tools let pass to a point: 0 in their shadow, 1 far from them.
 fn past_tools(point: vec3f) -> f32 {
-    return past(point, scene.tip, scene.tail) * past(point, scene.second_tip, scene.second_tail);
+    return past(point, scene.tools[0].tip, scene.tools[0].tail) * past(point, scene.tools[1].tip, scene.tools[1].tail);
 }
 
 fn past(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
@@ -98,7 +98,7 @@ fn painted_brain(colour: vec3f, rest: vec3f) -> vec3f {
 
 // Wetness of bone: while the burr turns, a film of water and blood covers its surroundings.
 fn wetness(point: vec3f) -> f32 {
-    return scene.light.w * (1.0 - smoothstep(1.0, 7.0, distance(point, scene.tip.xyz) - scene.tip.w));
+    return scene.light.w * (1.0 - smoothstep(1.0, 7.0, distance(point, scene.tools[0].tip.xyz) - scene.tools[0].tip.w));
 }
 
 // Whether there is a grain of bone dust at a point: one cell of 0.5 mm in twelve.
@@ -158,30 +158,17 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, look: vec4f, at_rest: v
     return lit(colour.xyz, normal, along, open, key, 0.35 + 0.15 * colour.w);
 }
 
-fn burr_colour(point: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
-    let axis = normalize(tail.xyz - tip.xyz);
-    let away = point - tip.xyz;
-    let angle = atan2(dot(away, cross(axis, scene.spin.xyz)), dot(away, scene.spin.xyz));
-    let flute = smoothstep(-0.2, 0.5, sin(8.0 * angle + 3.0 * dot(away, axis) / tip.w));
-    return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
+// Steel, dark in flutes and in a tube's bore; tines are insulated above their tips.
+fn tool_colour(p: vec3f, tool: ToolShape) -> vec3f {
+    let kind = i32(tool.look.x);
+    if fluted(p, tool) { return mix(vec3f(0.80, 0.80, 0.78), vec3f(0.30, 0.32, 0.36), groove(p, tool)); }
+    if kind == TUBE && length(p.xy) < 0.56 * tool.tail.w { return vec3f(0.02); }
+    return select(vec3f(0.62, 0.66, 0.72), vec3f(0.13, 0.22, 0.42), kind == TINES && p.z > 8.0);
 }
 
-// Closed tines with a dark gap between them, bare at the tips and insulated above.
-fn tines_colour(point: vec3f, normal: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
-    let bare = dot(point - tip.xyz, normalize(tail.xyz - tip.xyz)) < 8.0;
-    let beside = smoothstep(0.1, 0.3, abs(dot(normal, scene.spin.xyz)));
-    return beside * select(vec3f(0.13, 0.22, 0.42), vec3f(0.62, 0.66, 0.72), bare);
-}
-
-// Shades a tool hit `met`; `look` is the tool's style.
-fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, look: f32) -> vec3f {
-    let on_tip = min(met.y, met.z) > met.x;
-    let normal = tool_normal(point, tip, tail, met);
-    var colour = vec3f(0.62, 0.66, 0.72);
-    if on_tip && look == 1.0 { colour = burr_colour(point, tip, tail); }
-    if on_tip && look == 2.0 && dot(normal, normalize(tip.xyz - tail.xyz)) > 0.75 { colour = vec3f(0.02); }
-    if look == 3.0 { colour = tines_colour(point, normal, tip, tail); }
-    return lit(colour, normal, along, 1.0, 1.0, 0.7);
+fn shade_tool(point: vec3f, along: vec3f, tool: ToolShape) -> vec3f {
+    let colour = tool_colour(turned(point - tool.tip.xyz, tool), tool);
+    return lit(colour, tool_normal(point, tool), along, 1.0, 1.0, 0.7);
 }
 
 fn seen(at: vec2u) -> vec3f {
@@ -195,18 +182,16 @@ fn seen(at: vec2u) -> vec3f {
     // Where one plane cuts both, the depths are equal: bone is shown, even if the mesh reaches into
     // it.
     if look.w > 0.75 && on_cut(scene.eye.xyz + skull.w * along) { brain.w = NOTHING; }
-    let first = reach(along, scene.tip, scene.tail);
-    let second = reach(along, scene.second_tip, scene.second_tail);
-    let near = vec2f(min(first.x, min(first.y, first.z)), min(second.x, min(second.y, second.z)));
+    let near = vec2f(reach(along, scene.tools[0]), reach(along, scene.tools[1]));
     let t = min(min(skull.w, brain.w), min(near.x, near.y));
     let point = scene.eye.xyz + t * along;
     let back = pixel.y / scene.up.w;
     var colour = mix(vec3f(0.105, 0.125, 0.155), vec3f(0.035, 0.04, 0.05), back);
     if t >= NOTHING {
     } else if t == near.x {
-        colour = shade_tool(point, along, scene.tip, scene.tail, first, scene.tips.x);
+        colour = shade_tool(point, along, scene.tools[0]);
     } else if t == near.y {
-        colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, scene.tips.y);
+        colour = shade_tool(point, along, scene.tools[1]);
     } else if t == brain.w {
         colour = shade_brain(point, along, brain, look, unpacked(textureLoad(brain_rest, at, 0)));
     } else {

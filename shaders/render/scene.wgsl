@@ -1,6 +1,14 @@
 // Data shared by all passes of a picture: camera, bone grid, tool, light. Layout of the Rust type
 // `Scene`.
 
+// A tool where it is.
+struct ToolShape {
+    tip: vec4f,               // centre of its ball; w: its radius (negative: no tool)
+    tail: vec4f,              // far end of the shaft; w: its radius
+    across: vec4f,            // unit, across the shaft; w: how far its flutes have turned, rad
+    look: vec4f,              // x: what it looks like; y: mm of the shaft that cut; z: farthest from the axis, mm; w: length, mm
+}
+
 struct Scene {
     clip_from_world: mat4x4f,
     mri_from_world: mat4x4f,  // texture coordinates of the MRI, 0 to 1
@@ -10,15 +18,11 @@ struct Scene {
     forward: vec4f,           // to the picture's middle at distance 1; w: 1 if bone is shown
     origin: vec4f,            // world centre of the padded voxel (0, 0, 0); w: voxel edge, mm
     dims: vec4f,              // padded voxels along x, y, z; w: isovalue, HU
-    tip: vec4f,               // centre of the tool's ball; w: its radius (negative: no tool)
-    tail: vec4f,              // far end of the shaft; w: its radius
+    tools: array<ToolShape, 2>,    // in the first and in the second hand
     light: vec4f,             // unit, towards the light; w: 1 while drilling
-    spin: vec4f,              // unit, across the shaft: turns with the burr; w: share of a sample in the mean
-    second_tip: vec4f,        // the tool in the other hand, as `tip`
-    second_tail: vec4f,       // as `tail`
     brain_cut: vec4f,         // unit normal and offset of the plane over which the brain is cut away; zeroes: none
     bone_cut: vec4f,          // the same for bone
-    tips: vec4f,              // how the tools look, first and second: 1 a fluted tip, 2 the mouth of a tube, 3 two tines, 0 smooth; z: steps of the cut's lattice a voxel; w: voxels from one point of the smoothed CT to the next
+    steps: vec4f,             // x: steps of the cut's lattice a voxel; y: voxels from one point of the smoothed CT to the next; z: share of a sample in the mean
     bone_paint: array<vec4f, 2>,    // lower corner of the colours over bone (w: 1 if there are any), one over the box's size
     brain_paint: array<vec4f, 2>,   // the same over the brain at rest
 }
@@ -61,9 +65,9 @@ fn unfold(p: vec2f) -> vec3f {
     return normalize(vec3f(select(p, (1.0 - abs(p.yx)) * signs, z < 0.0), z));
 }
 
-// Distance to the nearest tool's surface, mm: a ball and a capsule each.
+// Distance to the nearest tool as contact knows it, mm: a ball and a capsule each.
 fn tool_distance(point: vec3f) -> f32 {
-    return min(distance_to(point, scene.tip, scene.tail), distance_to(point, scene.second_tip, scene.second_tail));
+    return min(distance_to(point, scene.tools[0].tip, scene.tools[0].tail), distance_to(point, scene.tools[1].tip, scene.tools[1].tail));
 }
 
 fn distance_to(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {

@@ -12,7 +12,7 @@ const REACH_MM: f32 = 0.5;   // from the middle to the corners of the cube whose
 
 // The smoothed CT at continuous padded grid coordinates, HU.
 fn smoothed(g: vec3f) -> f32 {
-    let at = (g / scene.tips.w + 0.5) / vec3f(textureDimensions(smooth_ct));
+    let at = (g / scene.steps.y + 0.5) / vec3f(textureDimensions(smooth_ct));
     return textureSampleLevel(smooth_ct, linear, at, 0.0).x;
 }
 
@@ -36,7 +36,7 @@ fn surface(g: vec3f, along: vec3f) -> Surface {
     if depth == FAR { return scanned; }
     // Eight differences over the cube, two of which go by each edge.
     let slope = length(gradient) / (8.0 * reach);
-    let node = 2.0 / scene.tips.z;
+    let node = 2.0 / scene.steps.x;
     if abs(depth) * node * slope > abs(hu(g) - scene.dims.w) { return scanned; }
     let h = vec2f(0.5 * node, 0.0);
     let rise = vec3f(drilled(g + h.xyy) - drilled(g - h.xyy), drilled(g + h.yxy) - drilled(g - h.yxy),

@@ -62,9 +62,9 @@ fn tissue(world: vec3f, rest: vec3f) -> vec3f {
     let moved = unpacked(textureLoad(section, vec2i(vec2f(pixel.x, position.y)), 0));
     var colour = tissue(world, select(world, moved.xyz, moved.w > 0.5));
     let mm = 2.0 * slice.centre.w / size.x;
-    if scene.tip.w > 0.0 {
-        let away = vec2f(dot(world - scene.tip.xyz, slice.right.xyz), dot(world - scene.tip.xyz, slice.up.xyz));
-        let beyond = length(away) > scene.tip.w + 4.0 * mm;
+    if scene.tools[0].tip.w > 0.0 {
+        let away = vec2f(dot(world - scene.tools[0].tip.xyz, slice.right.xyz), dot(world - scene.tools[0].tip.xyz, slice.up.xyz));
+        let beyond = length(away) > scene.tools[0].tip.w + 4.0 * mm;
         if beyond && min(abs(away.x), abs(away.y)) < 0.5 * mm { colour = mix(colour, vec3f(0.25, 0.85, 1.0), 0.65); }
         let gap = tool_distance(world);
         if gap < 0.0 { colour = mix(colour, vec3f(1.0, 0.80, 0.20), 0.35); }

@@ -1,6 +1,5 @@
 //! The inputs of a picture: the constant scene and the changing frame.
 
-use crate::tool::ends;
 use crate::{Camera, Cut, Overlay, Paint, Stereo};
 use glam::{IVec3, Vec3};
 use std::sync::Arc;
@@ -143,7 +142,7 @@ impl Frame<'_> {
     pub(crate) fn balls(&self) -> Vec<(Vec3, f32)> {
         let first = self.tool.map(|tool| (tool, self.world_from_tool));
         let balls = first.into_iter().chain(self.second);
-        balls.map(|(tool, pose)| (ends(&tool, &pose)[0].truncate(), tool.tip_radius_mm)).collect()
+        balls.map(|(tool, pose)| (pose.translation, tool.tip_radius_mm)).collect()
     }
 
     /// Intersection of the slices: the chosen point, else the tool's tip, or the camera's target if

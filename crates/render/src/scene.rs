@@ -5,9 +5,8 @@ use crate::camera::View;
 use crate::cut::Cut;
 use crate::frame::Frame;
 use crate::paint::Paint;
-use crate::tool::ends;
-use glam::{Mat4, Quat, Vec3, Vec4};
-use trepan_geometry::{Pose, Tool, ToolKind};
+use crate::tool::ToolShape;
+use glam::{Mat4, Vec3, Vec4};
 
 /// Layout of the shader's `Scene`.
 #[repr(C)]
@@ -21,15 +20,12 @@ pub(crate) struct Scene {
     pub forward: Vec4,
     pub origin: Vec4,
     pub dims: Vec4,
-    pub tip: Vec4,
-    pub tail: Vec4,
+    /// In the first and in the second hand.
+    pub tools: [ToolShape; 2],
     pub light: Vec4,
-    pub spin: Vec4,
-    pub second_tip: Vec4,
-    pub second_tail: Vec4,
     pub brain_cut: Vec4,
     pub bone_cut: Vec4,
-    pub tips: Vec4,
+    pub steps: Vec4,
     pub bone_paint: [Vec4; 2],
     pub brain_paint: [Vec4; 2],
 }
@@ -38,11 +34,8 @@ impl Scene {
     /// Collects a frame's data. `mri_from_world` maps to texture coordinates, if there is an MRI.
     pub fn of(frame: &Frame, view: &View, size: [u32; 2], grid: &Grid, mri_from_world: Option<Mat4>) -> Self {
         let [width, height] = size.map(|n| n as f32);
-        let tool = frame.tool.unwrap_or(NO_TOOL);
-        let [tip, tail] = ends(&tool, &frame.world_from_tool);
-        let (second, second_pose) = frame.second.unwrap_or((NO_TOOL, Pose::IDENTITY));
-        let [second_tip, second_tail] = ends(&second, &second_pose);
-        let across = frame.world_from_tool.rotation * (Quat::from_rotation_z(frame.turn_rad) * Vec3::X);
+        let turned = frame.tool.map(|tool| ToolShape::of(&tool, &frame.world_from_tool, frame.turn_rad));
+        let second = frame.second.map(|(tool, pose)| ToolShape::of(&tool, &pose, 0.0));
         let dims = Vec3::from(grid.dims.map(|n| n as f32));
         Self {
             clip_from_world: view.clip_from_world(),
@@ -53,17 +46,13 @@ impl Scene {
             forward: view.middle().extend(flag(frame.show_bone)),
             origin: grid.origin.extend(grid.spacing_mm),
             dims: dims.extend(grid.isovalue.into()),
-            tip,
-            tail,
-            second_tip,
-            second_tail,
+            tools: [turned, second].map(|tool| tool.unwrap_or(ToolShape::NONE)),
             brain_cut: Cut::plane(frame.cut.as_ref()),
             bone_cut: Cut::plane(frame.cut.as_ref().filter(|cut| cut.bone)),
-            tips: Vec4::new(look(tool.kind), look(second.kind), grid.steps as f32, grid.smooth_step as f32),
+            steps: Vec4::new(grid.steps as f32, grid.smooth_step as f32, 0.0, 0.0),
             bone_paint: Paint::placed(frame.bone_paint),
             brain_paint: Paint::placed(frame.brain_paint),
             light: towards_light(view).extend(flag(frame.drilling)),
-            spin: across.extend(0.0),
         }
     }
 
@@ -74,28 +63,10 @@ impl Scene {
         (self.forward.truncate() + x * self.right.truncate() + y * self.up.truncate()).normalize()
     }
 
-    /// Both tools: tip and tail of each.
-    pub fn tools(&self) -> [[Vec4; 2]; 2] {
-        [[self.tip, self.tail], [self.second_tip, self.second_tail]]
-    }
-
-    /// Distance to the nearest tool's surface, mm: a ball and a capsule each.
+    /// Distance to the nearest tool as contact knows it, mm: a ball and a capsule each.
     pub fn tool_distance(&self, point: Vec3) -> f32 {
-        let held = self.tools().into_iter().filter(|[tip, _]| tip.w > 0.0);
-        held.map(|[tip, tail]| distance(point, tip, tail)).fold(f32::INFINITY, f32::min)
-    }
-}
-
-const NO_TOOL: Tool =
-    Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0, cutting_mm: 0.0 };
-
-/// Style of a tool: a fluted tip, the mouth of a tube, two tines, or smooth.
-fn look(kind: ToolKind) -> f32 {
-    match kind {
-        cutting if cutting.cuts() => 1.0,
-        ToolKind::Aspirator => 2.0,
-        ToolKind::Bipolar => 3.0,
-        _ => 0.0,
+        let held = self.tools.iter().filter(|tool| tool.tip.w > 0.0);
+        held.map(|tool| distance(point, tool.tip, tool.tail)).fold(f32::INFINITY, f32::min)
     }
 }
 

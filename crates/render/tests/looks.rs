@@ -96,6 +96,11 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
         ("drilling", Frame { drilling: true, ..base }),
         ("tube and mill", Frame { tool: Some(Tool::aspirator()), second: Some((Tool::craniotome(), aside)), ..base }),
         ("tines", Frame { tool: Some(Tool::bipolar()), ..base }),
+        (
+            "perforator and blade",
+            Frame { tool: Some(Tool::perforator()), second: Some((Tool::spatula(), aside)), ..base },
+        ),
+        ("scalpel and probe", Frame { tool: Some(Tool::scalpel()), second: Some((Tool::probe(2.0), aside)), ..base }),
         ("blood and a burn", Frame { brain_stains: Some(&STAINS), show_bone: false, ..base }),
         ("dura", Frame { dura, show_bone: false, ..base }),
         ("both eyes", Frame { stereo: stereo(StereoLook::SideBySide), ..all }),
@@ -141,7 +146,7 @@ fn pictures_are_the_stored_ones_by_all_that_draw() {
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
     let mut on_device = device().map(|gpu| scene::renderer(&gpu, &data, size));
     let (paint, markers) = (blue(4.0, 1), [Vec3::new(10.0, 24.0, -6.0), Vec3::new(0.0, 0.0, 0.0)]);
-    for (name, frame) in frames(&paint, &markers).into_iter().take(12) {
+    for (name, frame) in frames(&paint, &markers).into_iter().take(14) {
         on_processor.draw(&frame).expect("drawn");
         let mut images = vec![on_processor.image().clone()];
         images.extend(on_device.as_mut().map(|device| {

@@ -193,7 +193,7 @@ impl Renderer {
         };
         let view = eye_view(frame, eye.area, 0).sample(mean.taken, eye.drawn);
         let mut scene = Scene::of(frame, &view, eye.drawn, &passes.skull.grid, passes.mri.texture_from_world);
-        scene.spin.w = 1.0 / (mean.taken + 1) as f32;
+        scene.steps.z = 1.0 / (mean.taken + 1) as f32;
         passes.scenes[0].write(&gpu, 0, &[scene]);
         let mut recorder = gpu.record("sample");
         eye.draw(&mut recorder, passes, frame, &scene, &view, picture);

@@ -92,7 +92,7 @@ impl EyeHits {
         self.fragments.draw(brain, view, inputs.scene.brain_cut, threads);
         let [width, height] = self.size.map(|n| n as usize);
         let (bricks, scene, fragments) = (inputs.bricks, inputs.scene, &self.fragments);
-        let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
+        let tools = scene.tools.map(|tool| overlay::rectangle(&tool, view, [width, height]));
         let cast_bone = show_bone && bricks.is_some();
         let sample = |pixel: usize| {
             let at = [pixel % width, pixel / width];
@@ -154,7 +154,7 @@ impl EyeHits {
     fn light(&mut self, inputs: &Inputs, brain: Option<&Border>, view: &View, threads: usize) {
         let [width, height] = self.size.map(|n| n as usize);
         let (rays, fragments, scene) = (&self.rays, &self.fragments, inputs.scene);
-        let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
+        let tools = scene.tools.map(|tool| overlay::rectangle(&tool, view, [width, height]));
         let near = |at: [usize; 2]| tools.map(|tool| overlay::inside(tool, at));
         let exact = |[x, y]: [usize; 2], _: &[[u8; 4]]| {
             let at = x + width * y;

@@ -4,12 +4,13 @@ use super::Inputs;
 use super::brain::Fragment;
 use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
-use super::tool::{ToolHit, lit};
+use super::tool::lit;
 use crate::border::{DURA, PIA, wave};
 use crate::bricks::NOTHING;
 use crate::mix::trilinear;
 use crate::mri::Signals;
 use crate::scene::Scene;
+use crate::tool::{TINES, TUBE, ToolShape};
 use glam::{Vec3, Vec4};
 use std::sync::LazyLock;
 
@@ -17,21 +18,21 @@ use std::sync::LazyLock;
 pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
-    let meets = |n: usize| if near[n] { ToolHit::of(scene.tools()[n], eye, along) } else { ToolHit::NONE };
+    let meets = |n: usize| if near[n] { scene.tools[n].reach(eye, along) } else { NOTHING };
     let [first, second] = [meets(0), meets(1)];
     // Where one plane cuts both, the depths are equal: bone is shown, even if the mesh reaches into
     // it.
     let under_bone = brain.cut && on_cut(scene.bone_cut, eye + bone.t * along);
     let brain_t = if under_bone { NOTHING } else { brain.t };
-    let t = bone.t.min(brain_t).min(first.t()).min(second.t());
+    let t = bone.t.min(brain_t).min(first).min(second);
     let point = eye + t * along;
     let colour = if t >= NOTHING {
         let back = (y as f32 + 0.5) / scene.up.w;
         Vec3::new(0.105, 0.125, 0.155).lerp(Vec3::new(0.035, 0.04, 0.05), back)
-    } else if t == first.t() {
-        shade_tool(scene, point, along, &first, scene.tips.x)
-    } else if t == second.t() {
-        shade_tool(scene, point, along, &second, scene.tips.y)
+    } else if t == first {
+        shade_tool(scene, point, along, &scene.tools[0])
+    } else if t == second {
+        shade_tool(scene, point, along, &scene.tools[1])
     } else if t == brain_t {
         shade_brain(inputs, point, along, brain)
     } else {
@@ -70,7 +71,8 @@ fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, bone: &Ray) -> Vec3 {
 
 /// Wetness of bone: while the burr turns, a film of water and blood covers its surroundings.
 fn wetness(scene: &Scene, point: Vec3) -> f32 {
-    let away = point.distance(scene.tip.truncate()) - scene.tip.w;
+    let tip = scene.tools[0].tip;
+    let away = point.distance(tip.truncate()) - tip.w;
     scene.light.w * (1.0 - smoothstep(1.0, 7.0, away))
 }
 
@@ -146,7 +148,7 @@ fn pass_by(gap: f32, way: f32) -> f32 {
 
 /// Fraction of light that the tools let pass to a point.
 fn past_tools(scene: &Scene, point: Vec3) -> f32 {
-    scene.tools().into_iter().map(|[tip, tail]| past(scene.light.truncate(), point, tip, tail)).product()
+    scene.tools.iter().map(|tool| past(scene.light.truncate(), point, tool.tip, tool.tail)).product()
 }
 
 fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
@@ -218,32 +220,17 @@ pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
     colour.lerp(mark / share.max(1e-3), 0.45 * share)
 }
 
-const STEEL: Vec3 = Vec3::new(0.62, 0.66, 0.72);
-
-/// Shades a tool hit; `look` is the tool's style.
-fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &ToolHit, look: f32) -> Vec3 {
-    let on_tip = met.t() == met.at[0];
-    let axis = (met.tail - met.tip).truncate().normalize();
-    let normal = met.normal(point);
-    let colour = match look {
-        1.0 if on_tip => burr_colour(scene, point, met, axis),
-        2.0 if on_tip && normal.dot(-axis) > 0.75 => Vec3::splat(0.02),
-        3.0 => tines_colour(scene, normal, (point - met.tip.truncate()).dot(axis)),
-        _ => STEEL,
-    };
-    lit(scene, colour, normal, along, 1.0, 1.0, 0.7)
+fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, tool: &ToolShape) -> Vec3 {
+    let colour = tool_colour(tool.turned(point - tool.tip.truncate()), tool);
+    lit(scene, colour, tool.normal(point), along, 1.0, 1.0, 0.7)
 }
 
-/// Closed tines with a dark gap between them, bare at the tips and insulated above.
-fn tines_colour(scene: &Scene, normal: Vec3, above_mm: f32) -> Vec3 {
-    let beside = smoothstep(0.1, 0.3, normal.dot(scene.spin.truncate()).abs());
-    beside * if above_mm < 8.0 { STEEL } else { Vec3::new(0.13, 0.22, 0.42) }
-}
-
-fn burr_colour(scene: &Scene, point: Vec3, met: &ToolHit, axis: Vec3) -> Vec3 {
-    let away = point - met.tip.truncate();
-    let across = scene.spin.truncate();
-    let angle = away.dot(axis.cross(across)).atan2(away.dot(across));
-    let flute = smoothstep(-0.2, 0.5, (8.0 * angle + 3.0 * away.dot(axis) / met.tip.w).sin());
-    Vec3::new(0.34, 0.36, 0.40).lerp(Vec3::new(0.80, 0.80, 0.78), flute)
+/// Steel, dark in flutes and in a tube's bore; tines are insulated above their tips.
+fn tool_colour(p: Vec3, tool: &ToolShape) -> Vec3 {
+    match tool.look.x as i32 {
+        _ if tool.is_fluted(p) => Vec3::new(0.80, 0.80, 0.78).lerp(Vec3::new(0.30, 0.32, 0.36), tool.groove(p)),
+        TUBE if p.truncate().length() < 0.56 * tool.tail.w => Vec3::splat(0.02),
+        TINES if p.z > 8.0 => Vec3::new(0.13, 0.22, 0.42),
+        _ => Vec3::new(0.62, 0.66, 0.72),
+    }
 }

@@ -1,12 +1,13 @@
 //! CPU version of `overlay.wgsl`: draws each shape in its pixel rectangle.
 
 use super::light::shown;
-use super::tool::{ToolHit, lit, shaft};
+use super::tool::{lit, shaft};
 use crate::bricks::NOTHING;
 use crate::camera::View;
 use crate::overlay::Item;
 use crate::scene::Scene;
-use glam::{Vec2, Vec3, Vec4};
+use crate::tool::ToolShape;
+use glam::{Vec2, Vec3};
 
 /// Fraction of alpha behind the scene.
 const HIDDEN: f32 = 0.25;
@@ -14,14 +15,14 @@ const HIDDEN: f32 = 0.25;
 /// Draws a shape into a picture; `depth` is the scene's distance at a pixel.
 pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4]], depth: impl Fn(usize) -> f32) {
     let (width, eye) = (scene.right.w as usize, scene.eye.truncate());
-    let [left, top, right, bottom] = rectangle(item.tip, item.tail, view, [width, scene.up.w as usize]);
+    let [left, top, right, bottom] = rectangle(&item.tool, view, [width, scene.up.w as usize]);
     for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
         let (along, at) = (scene.ray_of(x, y), x + width * y);
-        let (t, normal) = if item.kind.x > 0.5 { arrow(eye, along, item) } else { tool(eye, along, item) };
+        let (t, normal) = if item.is_arrow() { arrow(eye, along, &item.tool) } else { tool(eye, along, &item.tool) };
         if t >= NOTHING {
             continue;
         }
-        let tools = scene.tools().map(|tool| ToolHit::of(tool, eye, along).t());
+        let tools = scene.tools.map(|tool| tool.reach(eye, along));
         let hidden = t > depth(at).min(tools[0]).min(tools[1]);
         let alpha = item.colour.w * if hidden { HIDDEN } else { 1.0 };
         let colour = shown(lit(scene, item.colour.truncate(), normal, along, 1.0, 1.0, 0.3));
@@ -33,11 +34,12 @@ pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4
 
 /// Pixel rectangle (first and end) around a body's box with a margin of one pixel.
 /// It is the whole view if the box reaches behind the eye, and empty without a body.
-pub(crate) fn rectangle(tip: Vec4, tail: Vec4, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
+pub(crate) fn rectangle(tool: &ToolShape, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
+    let &ToolShape { tip, tail, .. } = tool;
     if tip.w <= 0.0 {
         return [0; 4];
     }
-    let radius = tip.w.max(tail.w);
+    let radius = tool.look.z;
     let size = Vec2::new(width as f32, height as f32);
     let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
     for n in 0..16 {
@@ -59,20 +61,20 @@ pub(crate) fn inside([left, top, right, bottom]: [usize; 4], [x, y]: [usize; 2])
     (left..right).contains(&x) && (top..bottom).contains(&y)
 }
 
-fn tool(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
-    let met = ToolHit::of([item.tip, item.tail], eye, along);
-    (met.t(), met.normal(eye + met.t() * along))
+fn tool(eye: Vec3, along: Vec3, tool: &ToolShape) -> (f32, Vec3) {
+    let t = tool.reach(eye, along);
+    (t, tool.normal(eye + t * along))
 }
 
-fn arrow(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
-    let (from, to) = (item.tip.truncate(), item.tail.truncate());
+fn arrow(eye: Vec3, along: Vec3, &ToolShape { tip, tail, .. }: &ToolShape) -> (f32, Vec3) {
+    let (from, to) = (tip.truncate(), tail.truncate());
     let down = (from - to).normalize();
-    let depth = (3.0 * item.tail.w).min(0.6 * to.distance(from));
-    let neck = (to + depth * down).extend(item.tip.w);
-    let t = shaft(eye, along, item.tip, neck);
+    let depth = (3.0 * tail.w).min(0.6 * to.distance(from));
+    let neck = (to + depth * down).extend(tip.w);
+    let t = shaft(eye, along, tip, neck);
     let across = eye + t * along - from;
     let stem = (t, (across - down * across.dot(down)).normalize_or_zero());
-    head(eye, along, to, down, depth, item.tail.w, stem)
+    head(eye, along, to, down, depth, tail.w, stem)
 }
 
 /// The nearer of a given surface and an arrow's head.

@@ -29,10 +29,10 @@ pub(crate) fn fragment(
     let world = plane.centre + offset.x * plane.right + offset.y * plane.up;
     let mut colour = tissue(inputs, world, rest.unwrap_or(world), look);
     let mm = 2.0 * plane.half.x / size.x;
-    if scene.tip.w > 0.0 {
-        let away = world - scene.tip.truncate();
+    if scene.tools[0].tip.w > 0.0 {
+        let away = world - scene.tools[0].tip.truncate();
         let away = Vec2::new(away.dot(plane.right), away.dot(plane.up));
-        if away.length() > scene.tip.w + 4.0 * mm && away.abs().min_element() < 0.5 * mm {
+        if away.length() > scene.tools[0].tip.w + 4.0 * mm && away.abs().min_element() < 0.5 * mm {
             colour = colour.lerp(Vec3::new(0.25, 0.85, 1.0), 0.65);
         }
         let gap = scene.tool_distance(world);
