@@ -57,7 +57,7 @@ pub(crate) fn marks(ui: &egui::Ui, column: Rect, planes: &[Plane; 3], chosen: bo
         let at = column.left_bottom() + egui::vec2(6.0, -26.0);
         let [red, green, blue] = (255.0 * OUTLINE).to_array().map(|share| share as u8);
         let outline = Color32::from_rgb(red, green, blue);
-        let text = format!("— {}", tr("surface of the brain model"));
+        let text = format!("— {}", tr("outline of the cortex, from the MRI"));
         painter.text(at, Align2::LEFT_BOTTOM, text, FontId::proportional(12.0), outline);
     }
 }
