@@ -47,14 +47,14 @@ fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
 
 // Tissue without its pia, as in the walls of a hole: grey matter is pink, white matter cream.
 fn bare_colour(rest: vec3f) -> vec3f {
-    let signal = textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0);
+    let signal = windowed(textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0));
     let flesh = mix(vec3f(0.66, 0.38, 0.34), vec3f(0.92, 0.78, 0.64), smoothstep(0.35, 0.75, signal.w));
     return tinted(flesh, signal);
 }
 
 fn brain_colour(rest: vec3f) -> vec3f {
     let at = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
-    let signal = textureSampleLevel(mri, linear, at, 0.0);
+    let signal = windowed(textureSampleLevel(mri, linear, at, 0.0));
     let flesh = vec3f(0.90, 0.53, 0.45);
     if scene.eye.w == 0.0 { return flesh * 0.85; }
     return tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal);
@@ -73,7 +73,7 @@ const BELOW_MM = 2.0;    // below the surface, where the grey matter is
 
 // The MRI on the cut brain, as grey as in the slices.
 fn cut_colour(rest: vec3f) -> vec3f {
-    let signal = textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0);
+    let signal = windowed(textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0));
     if scene.eye.w == 0.0 { return vec3f(0.62, 0.32, 0.29); }
     return pow(tinted(vec3f(signal.w), signal), vec3f(2.2));
 }
@@ -162,7 +162,7 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, look: vec4f, at_rest: v
 fn tool_colour(p: vec3f, tool: ToolShape) -> vec3f {
     let kind = i32(tool.look.x);
     if fluted(p, tool) { return mix(vec3f(0.80, 0.80, 0.78), vec3f(0.30, 0.32, 0.36), groove(p, tool)); }
-    if kind == TUBE && length(p.xy) < 0.56 * tool.tail.w { return vec3f(0.02); }
+    if kind == TUBE && p.z < BORE_MM && length(p.xy) < 0.56 * tool.tail.w { return vec3f(0.02); }
     return select(vec3f(0.62, 0.66, 0.72), vec3f(0.13, 0.22, 0.42), kind == TINES && p.z > 8.0);
 }
 

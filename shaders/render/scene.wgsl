@@ -23,6 +23,7 @@ struct Scene {
     brain_cut: vec4f,         // unit normal and offset of the plane over which the brain is cut away; zeroes: none
     bone_cut: vec4f,          // the same for bone
     steps: vec4f,             // x: steps of the cut's lattice a voxel; y: voxels from one point of the smoothed CT to the next; z: share of a sample in the mean
+    mri_window: vec4f,        // x: signal shown as black, 0 to 1; y: one over the range to white
     bone_paint: array<vec4f, 2>,    // lower corner of the colours over bone (w: 1 if there are any), one over the box's size
     brain_paint: array<vec4f, 2>,   // the same over the brain at rest
 }
@@ -76,6 +77,11 @@ fn distance_to(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     let along = clamp(dot(point - tip.xyz, axis) / dot(axis, axis), 0.0, 1.0);
     let shaft = distance(point, tip.xyz + along * axis) - tail.w;
     return min(shaft, distance(point, tip.xyz) - tip.w);
+}
+
+// The MRI's mark and its grey value within the window.
+fn windowed(signal: vec4f) -> vec4f {
+    return vec4f(signal.xyz, clamp((signal.w - scene.mri_window.x) * scene.mri_window.y, 0.0, 1.0));
 }
 
 // Blends a mark of the MRI over a colour.

@@ -48,7 +48,7 @@ fn tissue(world: vec3f, rest: vec3f) -> vec3f {
     let grey = clamp((hu - slice.window.x) / slice.window.y, 0.0, 1.0);
     let place = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
     let known = all(place >= vec3f(0.0)) && all(place <= vec3f(1.0));
-    let signal = textureSampleLevel(mri, linear, place, 0.0);
+    let signal = windowed(textureSampleLevel(mri, linear, place, 0.0));
     let share = slice.window.z * scene.eye.w * (1.0 - smoothstep(scene.dims.w - 150.0, scene.dims.w, hu));
     if !known { return vec3f(grey); }
     return mix(vec3f(grey), tinted(vec3f(signal.w), signal), share);

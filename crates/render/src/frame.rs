@@ -1,7 +1,7 @@
 //! The inputs of a picture: the constant scene and the changing frame.
 
 use crate::{Camera, Cut, Overlay, Paint, Stereo};
-use glam::{IVec3, Vec3};
+use glam::{IVec3, Vec3, Vec4};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Tool};
@@ -117,6 +117,10 @@ pub struct SliceLook {
     pub width_hu: f32,
     /// Weight of the MRI outside bone: 0 is CT only, 1 is MRI only.
     pub mri_share: f32,
+    /// MRI signal at the middle of its grey scale, 0 to 1, on slices, section and brain.
+    pub mri_level: f32,
+    /// Range of the MRI's signal from black to white; 1 shows all of it.
+    pub mri_width: f32,
     /// Half the height of the visible area, mm; `None` shows the whole volume.
     pub half_height_mm: Option<f32>,
     /// Point through which the slices pass, world mm; `None` follows the tool.
@@ -126,11 +130,19 @@ pub struct SliceLook {
 impl Default for SliceLook {
     /// A bone window, with the MRI inside the skull.
     fn default() -> Self {
-        Self { shown: true, level_hu: 500.0, width_hu: 2000.0, mri_share: 0.85, half_height_mm: None, through: None }
+        let (level_hu, width_hu, mri_share) = (500.0, 2000.0, 0.85);
+        let (mri_level, mri_width, half_height_mm) = (0.5, 1.0, None);
+        Self { shown: true, level_hu, width_hu, mri_share, mri_level, mri_width, half_height_mm, through: None }
     }
 }
 
 impl SliceLook {
+    /// The MRI's signal shown as black, and one over its range to white.
+    pub(crate) fn mri_window(self) -> Vec4 {
+        let width = self.mri_width.max(0.01);
+        Vec4::new(self.mri_level - 0.5 * width, 1.0 / width, 0.0, 0.0)
+    }
+
     /// The same for a scene without CT: MRI only.
     pub(crate) fn with_bone(self, bone: bool) -> Self {
         if bone { self } else { Self { mri_share: 1.0, ..self } }

@@ -26,6 +26,8 @@ pub(crate) struct Scene {
     pub brain_cut: Vec4,
     pub bone_cut: Vec4,
     pub steps: Vec4,
+    /// Signal shown as black; one over the range to white.
+    pub mri_window: Vec4,
     pub bone_paint: [Vec4; 2],
     pub brain_paint: [Vec4; 2],
 }
@@ -50,6 +52,7 @@ impl Scene {
             brain_cut: Cut::plane(frame.cut.as_ref()),
             bone_cut: Cut::plane(frame.cut.as_ref().filter(|cut| cut.bone)),
             steps: Vec4::new(grid.steps as f32, grid.smooth_step as f32, 0.0, 0.0),
+            mri_window: frame.slices.mri_window(),
             bone_paint: Paint::placed(frame.bone_paint),
             brain_paint: Paint::placed(frame.brain_paint),
             light: towards_light(view).extend(flag(frame.drilling)),

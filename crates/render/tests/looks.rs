@@ -106,6 +106,10 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
         ("both eyes", Frame { stereo: stereo(StereoLook::SideBySide), ..all }),
         ("anaglyph", Frame { stereo: stereo(StereoLook::Anaglyph), ..all }),
         ("all with slices", Frame { slices: SliceLook::default(), ..all }),
+        (
+            "window of the MRI",
+            Frame { slices: SliceLook { mri_level: 0.2, mri_width: 0.4, ..SliceLook::default() }, ..all },
+        ),
         ("nothing again", base),
     ]
 }
@@ -244,6 +248,9 @@ fn a_cut_brain_shows_its_mri_in_the_plane_and_moves_it_with_the_tissue() {
     let (middle, _) = bright(&Frame { brain_positions: Some(&moved), ..frame });
     assert!((middle - (160.0 - 1.0 * pixels_per_mm)).abs() < 1.5, "{middle}");
     assert_eq!(bright(&Frame { cut: None, ..frame }).1, 0, "uncut, the ball is hidden");
+    let narrow = SliceLook { mri_level: 0.1, mri_width: 0.1, ..frame.slices };
+    let (_, white) = bright(&Frame { slices: narrow, ..frame });
+    assert!(white as f32 > 2.0 * area as f32, "what is dark around the ball is white too: {white} of {area}");
 }
 
 #[test]

@@ -209,7 +209,7 @@ impl Look {
     }
 
     fn grey_values(&mut self, ui: &mut egui::Ui) {
-        let SliceLook { level_hu, width_hu, mri_share, through, .. } = &mut self.slices;
+        let SliceLook { level_hu, width_hu, mri_share, mri_level, mri_width, through, .. } = &mut self.slices;
         ui.checkbox(&mut self.whole, tr("Slices of the whole head"));
         if ui.add_enabled(through.is_some(), egui::Button::new(tr("Slices follow the tool again"))).clicked() {
             *through = None;
@@ -217,6 +217,8 @@ impl Look {
         ui.add(egui::Slider::new(level_hu, -1000.0..=2000.0).step_by(10.0).text(tr("level, HU")));
         ui.add(egui::Slider::new(width_hu, 50.0..=4000.0).step_by(10.0).text(tr("window, HU")));
         ui.add(egui::Slider::new(mri_share, 0.0..=1.0).fixed_decimals(2).text(tr("MRI over CT")));
+        ui.add(egui::Slider::new(mri_level, 0.0..=1.0).fixed_decimals(2).text(tr("level, MRI")));
+        ui.add(egui::Slider::new(mri_width, 0.05..=1.5).fixed_decimals(2).text(tr("window, MRI")));
     }
 }
 

@@ -57,8 +57,11 @@ pub(crate) fn marks(ui: &egui::Ui, column: Rect, planes: &[Plane; 3], chosen: bo
         let at = column.left_bottom() + egui::vec2(6.0, -26.0);
         let [red, green, blue] = (255.0 * OUTLINE).to_array().map(|share| share as u8);
         let outline = Color32::from_rgb(red, green, blue);
-        let text = format!("— {}", tr("outline of the cortex, from the MRI"));
-        painter.text(at, Align2::LEFT_BOTTOM, text, FontId::proportional(12.0), outline);
+        let text = format!("— {}", tr("outline of the cortex (MRI)"));
+        let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), outline);
+        let area = Align2::LEFT_BOTTOM.anchor_size(at, galley.size());
+        painter.rect_filled(area.expand(2.0), 2.0, Color32::from_black_alpha(200));
+        painter.galley(area.min, galley, outline);
     }
 }
 

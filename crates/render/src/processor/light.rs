@@ -4,7 +4,7 @@ use super::Inputs;
 use super::brain::Fragment;
 use super::drilled::{Surface, lift};
 use super::skull::{Ray, on_cut};
-use super::tool::lit;
+use super::tool::{BORE_MM, lit};
 use crate::border::{DURA, PIA, wave};
 use crate::bricks::NOTHING;
 use crate::mix::trilinear;
@@ -88,7 +88,7 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
     let painted = |colour| inputs.brain_paint.map_or(colour, |paint| paint.over(colour, brain.rest));
     let mut key = past_tools(scene, point);
     if brain.cut {
-        return painted(cut_colour(inputs.mri, brain.rest)) * (0.6 + 0.4 * key);
+        return painted(cut_colour(scene, inputs.mri, brain.rest)) * (0.6 + 0.4 * key);
     }
     let mut open = brain.open;
     key *= open;
@@ -105,8 +105,8 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
     }
     let in_sulcus = 1.0 - smoothstep(0.65, 0.95, brain.open);
     let flesh = match inputs.mri {
-        Some(signals) if brain.open > 0.5 * (1.0 + PIA) => bare_colour(signals, brain.rest),
-        mri => vessels_over(brain_colour(mri, brain.rest - BELOW_MM * brain.normal), brain.ways, in_sulcus),
+        Some(signals) if brain.open > 0.5 * (1.0 + PIA) => bare_colour(scene, signals, brain.rest),
+        mri => vessels_over(brain_colour(scene, mri, brain.rest - BELOW_MM * brain.normal), brain.ways, in_sulcus),
     };
     let colour = painted(flesh);
     let (colour, film) = stained(colour, brain.stain);
@@ -182,8 +182,8 @@ fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
 }
 
 /// Tissue without its pia, as in the walls of a hole: grey matter is pink, white matter cream.
-fn bare_colour(signals: &Signals, rest: Vec3) -> Vec3 {
-    let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
+fn bare_colour(scene: &Scene, signals: &Signals, rest: Vec3) -> Vec3 {
+    let signal = signal(scene, signals, signals.texture_from_world.transform_point3(rest));
     let white = smoothstep(0.35, 0.75, signal.w);
     tinted(Vec3::new(0.66, 0.38, 0.34).lerp(Vec3::new(0.92, 0.78, 0.64), white), signal)
 }
@@ -191,26 +191,27 @@ fn bare_colour(signals: &Signals, rest: Vec3) -> Vec3 {
 /// Depth below the surface at which the MRI is sampled, mm, numerical: where grey matter is.
 const BELOW_MM: f32 = 2.0;
 
-fn brain_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
+fn brain_colour(scene: &Scene, mri: Option<&Signals>, rest: Vec3) -> Vec3 {
     let flesh = Vec3::new(0.90, 0.53, 0.45);
     mri.map_or(flesh * 0.85, |signals| {
-        let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
+        let signal = signal(scene, signals, signals.texture_from_world.transform_point3(rest));
         tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal)
     })
 }
 
 /// The MRI on the cut brain, as grey as in the slices.
-fn cut_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
+fn cut_colour(scene: &Scene, mri: Option<&Signals>, rest: Vec3) -> Vec3 {
     mri.map_or(Vec3::new(0.62, 0.32, 0.29), |signals| {
-        let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
+        let signal = signal(scene, signals, signals.texture_from_world.transform_point3(rest));
         tinted(Vec3::splat(signal.w), signal).powf(2.2)
     })
 }
 
-/// Mark and grey value at texture coordinates, 0 to 1.
-pub(crate) fn signal(signals: &Signals, at: Vec3) -> Vec4 {
+/// Mark and grey value within the window at texture coordinates, 0 to 1.
+pub(crate) fn signal(scene: &Scene, signals: &Signals, at: Vec3) -> Vec4 {
     let voxel = at * Vec3::from(signals.dims.map(|n| n as f32)) - 0.5;
-    trilinear(signals.dims, voxel, |n| Vec4::from(signals.texels[n].map(f32::from))) / 255.0
+    let signal = trilinear(signals.dims, voxel, |n| Vec4::from(signals.texels[n].map(f32::from))) / 255.0;
+    signal.with_w(((signal.w - scene.mri_window.x) * scene.mri_window.y).clamp(0.0, 1.0))
 }
 
 /// CPU version of the shader's `tinted`: a colour with a mark over it.
@@ -229,7 +230,7 @@ fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, tool: &ToolShape) -> Vec3
 fn tool_colour(p: Vec3, tool: &ToolShape) -> Vec3 {
     match tool.look.x as i32 {
         _ if tool.is_fluted(p) => Vec3::new(0.80, 0.80, 0.78).lerp(Vec3::new(0.30, 0.32, 0.36), tool.groove(p)),
-        TUBE if p.truncate().length() < 0.56 * tool.tail.w => Vec3::splat(0.02),
+        TUBE if p.z < BORE_MM && p.truncate().length() < 0.56 * tool.tail.w => Vec3::splat(0.02),
         TINES if p.z > 8.0 => Vec3::new(0.13, 0.22, 0.42),
         _ => Vec3::new(0.62, 0.66, 0.72),
     }

@@ -67,7 +67,7 @@ fn tissue(inputs: &Inputs, world: Vec3, rest: Vec3, look: &SliceLook) -> Vec3 {
     if !known {
         return grey;
     }
-    let signal = signal(signals, place);
+    let signal = signal(inputs.scene, signals, place);
     grey.lerp(tinted(Vec3::splat(signal.w), signal), share)
 }
 

@@ -21,7 +21,7 @@ const MOST_STEPS: usize = 64;
 /// Length of a perforator's body with its hub as drawn, mm, numerical.
 const BODY_MM: f32 = 13.0;
 /// Depth of a tube's bore as drawn, mm, numerical.
-const BORE_MM: f32 = 8.0;
+pub(crate) const BORE_MM: f32 = 8.0;
 
 fn capsule(p: Vec3, low: f32, high: f32) -> f32 {
     (p - p.z.clamp(low, high) * Vec3::Z).length()
