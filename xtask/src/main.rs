@@ -3,6 +3,7 @@
 mod bundle;
 mod constants;
 mod fuzz;
+mod gallery;
 mod layers;
 mod merge;
 mod modules;
@@ -84,6 +85,15 @@ enum Task {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    /// Draw fixed views of the programs and show them beside the kept ones, on one page
+    Gallery {
+        /// Where page and pictures go
+        #[arg(long, value_name = "DIR", default_value = "target/gallery")]
+        out: PathBuf,
+        /// Keep these pictures, in fixtures/pictures/gallery: look at them before
+        #[arg(long)]
+        keep: bool,
+    },
     /// Check that every arrow between crates points down and that each crate does only what is its
     /// to do
     Layers,
@@ -129,6 +139,7 @@ fn run() -> Result<()> {
             validate(&arguments.collect::<Vec<String>>())
         }
         Task::Bundle { out, .. } => bundle::gpu(&root(), &out),
+        Task::Gallery { out, keep } => gallery::run(&root(), &out, keep),
         Task::Layers => report("layers", layers::check(&root())?),
         Task::Tidy => report("tidy", tidy(&root())?),
         Task::Size => report("size", size::check(&root())?),

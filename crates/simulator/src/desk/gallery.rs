@@ -1,6 +1,7 @@
 //! Every page of the three programs at every size: no control is out of reach. With
 //! `TREPAN_GALLERY` as the name of a folder the pages, and those of a session, are kept there as
-//! pictures, in the language `TREPAN_GALLERY_LANGUAGE`.
+//! pictures, in the language `TREPAN_GALLERY_LANGUAGE`; with `TREPAN_GALLERY_PROGRAM` those of one
+//! program in one size.
 
 use super::*;
 use crate::desk::action::Action;
@@ -84,7 +85,7 @@ impl Gallery {
 
     /// Waits until a text is shown, in the language of the window.
     fn waits_for(&mut self, text: &str) {
-        for _ in 0..1200 {
+        for _ in 0..3000 {
             self.window.step();
             if self.shows(&tr(text)) {
                 return;
@@ -96,7 +97,8 @@ impl Gallery {
 
     /// Looks at the page in every size.
     fn look(&mut self, name: &str) {
-        for ([width, height], scale) in SIZES {
+        let sizes = if only().is_some() { &SIZES[1..2] } else { &SIZES };
+        for &([width, height], scale) in sizes {
             self.window.set_pixels_per_point(scale);
             self.window.step();
             self.window.set_size([width / scale, height / scale].into());
@@ -205,6 +207,14 @@ impl Gallery {
         self.press("Keys", "F1");
         self.look("help");
         self.press("Keys", "F1");
+        for (name, words, key) in [("microscope", "Microscope", "M"), ("section", "Section", "C")] {
+            self.press(words, key);
+            if name == "section" {
+                self.window.get_by_label(&tr("axial")).click_accesskit();
+            }
+            self.look(name);
+            self.press(words, key);
+        }
         self.press("Large type", "L");
         self.look("large");
         self.press("Large type", "L");
@@ -220,9 +230,15 @@ impl Gallery {
     }
 }
 
+/// The one program whose pages are wanted; `None` for all.
+fn only() -> Option<String> {
+    std::env::var("TREPAN_GALLERY_PROGRAM").ok()
+}
+
 #[test]
 fn every_page_can_be_used_at_every_size() {
-    for program in [Program::Craniotomy, Program::Brain, Program::Integrated] {
+    let wanted = |program: &Program| only().is_none_or(|only| only == program.name());
+    for program in [Program::Craniotomy, Program::Brain, Program::Integrated].into_iter().filter(wanted) {
         let home = tempfile::tempdir().unwrap();
         let mut gallery = Gallery::open(program, home.path());
         gallery.walk(&mut |gallery, name| gallery.look(name));
