@@ -20,7 +20,7 @@ const FLOORS: [&[&str]; 12] = [
     &["models"],
     &["report"],
     &["simulator"],
-    &["craniotomy", "brain", "integrated", "trials-scenes"],
+    &["craniotomy", "brain", "integrated", "trials-scenes", "python"],
     &["trials-bone", "trials-tissue"],
     &["trials-sessions"],
     &["trials"],
@@ -54,16 +54,13 @@ const WORDS: [(&str, &[&str]); 6] = [
     ("unsafe {", &["haptics", "soft", "simulator", "emulators"]),
 ];
 
+/// A crate that is a workspace of its own.
+const APART: &str = "crates/python";
+
 /// All faults found, each one line.
 pub fn check(root: &Path) -> Result<Vec<String>> {
-    let out = Command::new("cargo")
-        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
-        .current_dir(root)
-        .output()
-        .context("cannot run cargo metadata")?;
-    let metadata: Value = serde_json::from_slice(&out.stdout).context("cargo metadata gave no JSON")?;
     let mut faults = Vec::new();
-    for package in metadata["packages"].as_array().into_iter().flatten() {
+    for package in [packages(root)?, packages(&root.join(APART))?].concat() {
         let name = short(package["name"].as_str().unwrap_or_default());
         if name == "xtask" {
             continue;
@@ -81,6 +78,17 @@ pub fn check(root: &Path) -> Result<Vec<String>> {
         faults.extend(modules::circles(name, &manifest.with_file_name("src"))?);
     }
     Ok(faults)
+}
+
+/// The packages of the workspace in a folder.
+fn packages(folder: &Path) -> Result<Vec<Value>> {
+    let out = Command::new("cargo")
+        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
+        .current_dir(folder)
+        .output()
+        .context("cannot run cargo metadata")?;
+    let metadata: Value = serde_json::from_slice(&out.stdout).context("cargo metadata gave no JSON")?;
+    Ok(metadata["packages"].as_array().cloned().unwrap_or_default())
 }
 
 fn short(package: &str) -> &str {
@@ -127,7 +135,8 @@ pub fn rust_files(folder: &Path) -> Result<Vec<PathBuf>> {
     files(folder, "rs")
 }
 
-/// Every file with an extension under a folder, sorted; none when the folder is missing.
+/// Every file with an extension under a folder, sorted; none when the folder is missing. What cargo
+/// builds there, `target`, is passed over.
 pub fn files(folder: &Path, extension: &str) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_path_buf()];
@@ -135,7 +144,7 @@ pub fn files(folder: &Path, extension: &str) -> Result<Vec<PathBuf>> {
         for entry in fs::read_dir(&next).with_context(|| format!("cannot list {}", next.display()))? {
             let path = entry?.path();
             if path.is_dir() {
-                folders.push(path);
+                folders.extend(Some(path).filter(|path| !path.ends_with("target")));
             } else if path.extension().is_some_and(|e| e == extension) {
                 found.push(path);
             }
