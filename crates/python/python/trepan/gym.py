@@ -30,12 +30,12 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     burr turns all the time. A step lasts 10 ms, ten ticks of the haptic loop.
 
     An **observation** of shape (35,), float32: tip from the entry along the three axes, mm; force
-    on the tip along them, N; bone removed, mm3; depth of the proxy behind the inner table, mm; 1
+    on the tip along them, N; bone removed, mm3; depth of the burr behind the inner table, mm; 1
     after the breakthrough, else 0; speed of the spindle, 1000/min; and a map of 5 x 5 points across
-    the burr, 1 mm apart, 1 where there is bone at the height of the tip.
+    the burr, 1 mm apart, 1 where there is bone at the height of the burr's front.
 
-    The **reward** is the progress of the proxy towards the inner table, mm, less 0.01 a step, less
-    0.02 for each newton over 20 N. 200 ms after the breakthrough an episode ends with +10 less 2
+    The **reward** is the progress of the burr to the inner table, mm, less 0.01 a step, less 0.02
+    for each newton over 20 N. 200 ms after the breakthrough an episode ends with +10 less 2
     for each millimetre of the deepest plunge behind the table; 30 mm off the entry ends it as well,
     and it is truncated after ``steps``.
 
@@ -96,7 +96,7 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise ValueError(f"action is {action}: it must be three finite numbers from -1 to 1")
         ticks = np.arange(1, _TICKS + 1)[:, None] * (1e-3 * self._speed * way)
         path = self._contact.path(self._tip + ticks, drilling=True)
-        before = self._proxy[2]
+        before = self._way_left()
         self._tip = self._tip + ticks[-1]
         self._proxy = path.proxy_mm[-1].astype(np.float64)
         self._force = self._contact.stiffness_n_per_mm * float(path.depth_mm[-1]) * path.normal[-1]
@@ -107,7 +107,7 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._through_at is None and path.broke_through.any():
             self._through_at = self._step
         is_done = self._through_at is not None and self._step >= self._through_at + _AFTER
-        reward = before - self._proxy[2] - 0.01 - 0.02 * max(0.0, float(np.linalg.norm(self._force)) - 20.0)
+        reward = before - self._way_left() - 0.01 - 0.02 * max(0.0, float(np.linalg.norm(self._force)) - 20.0)
         if is_done:
             reward += 10.0 - 2.0 * self._deepest
         is_lost = bool(np.linalg.norm(self._tip - self._entry) > 30.0)
@@ -127,6 +127,11 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 if outside.any() and 2.0 < 0.1 * outside.argmax():
                     return entry, float(0.1 * outside.argmax())
         raise ValueError("no bone of 2 to 20 mm was found on the top of the CT: is it a head in RAS?")
+
+    def _way_left(self) -> float:
+        """Way of the burr's front to the inner table, mm; 0 behind it."""
+        front = self._proxy[2] - self._burr.tip_radius_mm
+        return float(max(0.0, front - (self._entry[2] - self._thickness)))
 
     def _plunge(self) -> float:
         """How far the burr reaches behind the inner table, mm."""
