@@ -50,7 +50,7 @@ print(f"{len(surface.triangles)} triangles")
 bone = trepan.BoneVolume(skull, isovalue)
 low, high = np.array(bone.bounds_mm)
 middle = 0.5 * (low + high)
-outer = trepan.scenes.first_bone(bone, [middle[0], middle[1], high[2] + 2], middle)
+outer = trepan.first_bone(bone, [middle[0], middle[1], high[2] + 2], middle)
 assert outer is not None, "no bone over the middle of the head"
 below = outer - np.arange(0, 30, 0.1)[:, None] * [0, 0, 1]
 thickness_mm = 0.1 * np.argmin(bone.is_bone(below))

@@ -58,12 +58,20 @@ fn tuple(shape: &[usize]) -> String {
     format!("({}{})", numbers.join(", "), if shape.len() == 1 { "," } else { "" })
 }
 
-/// A number over 0 whose name ends with its unit.
-pub fn positive(number: f32, name: &str) -> PyResult<f32> {
-    match number.is_finite() && number > 0.0 {
+/// Largest coordinate, mm: a kilometre.
+const FAR_MM: f32 = 1e6;
+
+/// A number within bounds, whose name ends with its unit.
+pub fn within(number: f32, name: &str, [low, high]: [f32; 2]) -> PyResult<f32> {
+    match (low..=high).contains(&number) {
         true => Ok(number),
-        false => Err(value(format!("{name} is {number}: it must be over 0 and finite"))),
+        false => Err(value(format!("{name} is {number}: it must be {low} to {high}"))),
     }
+}
+
+/// Whether a place is finite and within a kilometre.
+fn is_place(point: &Vec3) -> bool {
+    point.abs().cmple(Vec3::splat(FAR_MM)).all()
 }
 
 /// An affine of shape (4, 4).
@@ -129,8 +137,11 @@ pub fn check_room(grid: &Grid) -> PyResult<()> {
 /// Finite points from an array of shape (n, 3).
 pub fn points(any: &Any<'_>, name: &str) -> PyResult<Vec<Vec3>> {
     let points: Vec<Vec3> = rows::<f32, 3>(any, name)?.into_iter().map(Vec3::from_array).collect();
-    match points.iter().position(|point| !point.is_finite()) {
-        Some(at) => Err(value(format!("{name}[{at}] is {}: every coordinate must be a finite number", points[at]))),
+    match points.iter().position(|point| !is_place(point)) {
+        Some(at) => Err(value(format!(
+            "{name}[{at}] is {}: every coordinate must be finite and within a kilometre",
+            points[at]
+        ))),
         None => Ok(points),
     }
 }
@@ -193,7 +204,11 @@ pub fn tet_mesh(any: &Any<'_>) -> PyResult<TetMesh> {
 pub fn vector(any: &Any<'_>, name: &str) -> PyResult<Vec3> {
     let numbers = any.extract::<[f32; 3]>().map_err(|_| value(format!("{name} must be three numbers")))?;
     let vector = Vec3::from_array(numbers);
-    if vector.is_finite() { Ok(vector) } else { Err(value(format!("{name} is {vector}: it must be finite"))) }
+    if is_place(&vector) {
+        Ok(vector)
+    } else {
+        Err(value(format!("{name} is {vector}: it must be finite, within 1e6")))
+    }
 }
 
 /// A pose from a position, mm, and a quaternion x, y, z, w; no turn without one.

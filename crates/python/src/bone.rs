@@ -1,7 +1,7 @@
 //! Bone that is drilled, and the contact of a tool with it.
 
 use crate::arrays::{
-    Any, Array1, Array2, Array3, affine_out, array, column, columns, points, pose, positive, turn, volume, volume_out,
+    Any, Array1, Array2, Array3, affine_out, array, column, columns, points, pose, turn, volume, volume_out, within,
 };
 use crate::errors::{compute, value};
 use crate::tool::Tool;
@@ -33,6 +33,7 @@ impl BoneVolume {
     #[new]
     fn new(py: Python<'_>, volume: &Any<'_>, isovalue: i16) -> PyResult<Self> {
         let ct = self::volume::<i16>(volume)?;
+        within(ct.spacing_mm().x as f32, "the edge of a voxel in mm", [0.02, 20.0])?;
         let bone = compute(py, || trepan_bone::BoneVolume::of(ct, isovalue))?.map_err(value)?;
         Ok(Self { bone, writer: Mutex::new(()) })
     }
@@ -45,11 +46,6 @@ impl BoneVolume {
     #[getter]
     fn spacing_mm(&self) -> f32 {
         self.bone.spacing_mm()
-    }
-
-    #[getter]
-    fn isovalue(&self) -> i16 {
-        self.bone.isovalue()
     }
 
     /// Lowest and highest corner of the bone before drilling, RAS mm.
@@ -90,7 +86,6 @@ pub struct RigidStep {
     spindle_rpm: f32,
     /// Whether the cut came through to 3 mm without bone.
     broke_through: bool,
-    points_in_contact: u32,
     /// Times that the method had to fall back, as after a jump.
     fallbacks: u32,
 }
@@ -132,7 +127,7 @@ impl State {
     fn tick(&mut self, bone: &BoneVolume, pose: Pose, drilling: bool, dt_ms: f32) -> RigidStep {
         let _writer = drilling.then(|| bone.writer.lock().unwrap_or_else(PoisonError::into_inner));
         self.contact.step(&bone.bone, &ToolState::at(pose), drilling, dt_ms, &mut self.out);
-        let Step { manifold, removed_mm3, spindle_rpm, broke_through, points_in_contact, fallbacks, .. } = &self.out;
+        let Step { manifold, removed_mm3, spindle_rpm, broke_through, fallbacks, .. } = &self.out;
         RigidStep {
             depth_mm: manifold.depth_mm,
             normal: manifold.normal.into(),
@@ -141,7 +136,6 @@ impl State {
             removed_mm3: *removed_mm3,
             spindle_rpm: *spindle_rpm,
             broke_through: *broke_through,
-            points_in_contact: *points_in_contact,
             fallbacks: *fallbacks,
         }
     }
@@ -188,7 +182,7 @@ impl RigidContact {
         dt_ms: f32,
     ) -> PyResult<RigidStep> {
         let pose = pose(position, quaternion)?;
-        positive(dt_ms, "dt_ms")?;
+        within(dt_ms, "dt_ms", [1e-3, 1e3])?;
         let bone = self.bone.get();
         compute(py, || self.state().tick(bone, pose, drilling, dt_ms))
     }
@@ -207,7 +201,7 @@ impl RigidContact {
     ) -> PyResult<RigidPath> {
         let poses = poses(positions, quaternions)?;
         let drilling = switches(drilling, poses.len())?;
-        positive(dt_ms, "dt_ms")?;
+        within(dt_ms, "dt_ms", [1e-3, 1e3])?;
         let bone = self.bone.get();
         let mut ticks = Vec::with_capacity(poses.len());
         for (poses, drilling) in poses.chunks(TICKS).zip(drilling.chunks(TICKS)) {

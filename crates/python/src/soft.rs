@@ -1,6 +1,6 @@
 //! Materials, loads, and the TLED solver of soft tissue.
 
-use crate::arrays::{Any, Array2, nodes, points_out, positive, tet_mesh, vector};
+use crate::arrays::{Any, Array2, nodes, points_out, tet_mesh, vector, within};
 use crate::errors::{compute, value};
 use crate::tissue::TissueStep;
 use glam::Vec3;
@@ -64,10 +64,6 @@ impl Material {
     fn density_g_mm3(&self) -> f32 {
         self.material.density_g_mm3()
     }
-
-    fn __repr__(&self) -> String {
-        format!("Material.{:?}", self.material)
-    }
 }
 
 impl Material {
@@ -106,11 +102,9 @@ impl Loads {
     fn press(&self, nodes: &Any<'_>, normal: &Any<'_>, offset_mm: f32, stiffness: f32, damping: f32) -> PyResult<()> {
         let normal =
             vector(normal, "normal")?.try_normalize().ok_or_else(|| value("normal is 0: it needs a length"))?;
-        let numbers = [("offset_mm", offset_mm, f32::MIN), ("stiffness", stiffness, 0.0), ("damping", damping, 0.0)];
-        if let Some((name, number, least)) = numbers.into_iter().find(|(_, n, least)| !(n.is_finite() && n >= least)) {
-            let least = if least < 0.0 { "" } else { " and at least 0" };
-            return Err(value(format!("{name} is {number}: it must be finite{least}")));
-        }
+        within(offset_mm, "offset_mm", [-1e6, 1e6])?;
+        within(stiffness, "stiffness", [0.0, 1e6])?;
+        within(damping, "damping", [0.0, 1e6])?;
         let mut spring = NodalContact::none();
         (spring.normal, spring.offset_mm, spring.stiffness, spring.damping) = (normal, offset_mm, stiffness, damping);
         let nodes = crate::arrays::nodes(nodes, "nodes")?;
@@ -266,7 +260,7 @@ impl Tled {
     #[pyo3(signature = (loads, dt_ms=None, steps=1))]
     fn step(&self, py: Python<'_>, loads: &Loads, dt_ms: Option<f32>, steps: u32) -> PyResult<StepReport> {
         let dt_ms = dt_ms.unwrap_or_else(|| self.solver().stable_dt_ms());
-        positive(dt_ms, "dt_ms")?;
+        within(dt_ms, "dt_ms", [1e-6, 1e3])?;
         let (mut sum, mut left) = (StepReport::default(), steps);
         while left > 0 {
             let now = left.min(STEPS);

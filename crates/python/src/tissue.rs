@@ -37,10 +37,6 @@ impl TissueStep {
     fn points_in_contact(&self) -> u32 {
         self.step.points_in_contact
     }
-
-    fn __repr__(&self) -> String {
-        format!("TissueStep(depth_mm={}, force_n={:?})", self.depth_mm(), self.force_n())
-    }
 }
 
 /// A ball-tipped tool against a tetrahedral mesh that moves (``trepan-deformable``).

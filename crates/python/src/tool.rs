@@ -1,6 +1,6 @@
 //! Surgical tools.
 
-use crate::arrays::positive;
+use crate::arrays::within;
 use pyo3::prelude::*;
 
 /// A round tip on a straight shaft along +z of the tool's frame.
@@ -14,13 +14,13 @@ impl Tool {
     /// A round burr on a shank of 2.4 mm, which cuts bone.
     #[staticmethod]
     fn burr(tip_radius_mm: f32) -> PyResult<Self> {
-        Ok(Self { tool: trepan_geometry::Tool::burr(positive(tip_radius_mm, "tip_radius_mm")?) })
+        Ok(Self { tool: trepan_geometry::Tool::burr(within(tip_radius_mm, "tip_radius_mm", [0.02, 50.0])?) })
     }
 
     /// A blunt ball probe, which never cuts.
     #[staticmethod]
     fn probe(tip_radius_mm: f32) -> PyResult<Self> {
-        Ok(Self { tool: trepan_geometry::Tool::probe(positive(tip_radius_mm, "tip_radius_mm")?) })
+        Ok(Self { tool: trepan_geometry::Tool::probe(within(tip_radius_mm, "tip_radius_mm", [0.02, 50.0])?) })
     }
 
     /// A cranial perforator of 11 mm.

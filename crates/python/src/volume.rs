@@ -1,6 +1,6 @@
 //! Images: read, convert, resample, write.
 
-use crate::arrays::{Any, Array2, Array3, affine_out, check_room, fields, mask, positive, volume, volume_out};
+use crate::arrays::{Any, Array2, Array3, affine_out, check_room, fields, mask, volume, volume_out, within};
 use crate::errors::{compute, content, of_file, value};
 use numpy::Element;
 use pyo3::exceptions::PyFileNotFoundError;
@@ -77,7 +77,7 @@ pub fn isotropic_over<'py>(
     affine: &Any<'py>,
     spacing_mm: f32,
 ) -> PyResult<([usize; 3], Array2<'py, f64>)> {
-    positive(spacing_mm, "spacing_mm")?;
+    within(spacing_mm, "spacing_mm", [1e-4, 1e3])?;
     // No sample is needed to place a grid.
     let empty = VoxelVolume::<u8> { dims: shape, data: Vec::new(), world_from_voxel: crate::arrays::affine(affine)? };
     let grid = Grid::isotropic_over(&empty, spacing_mm);

@@ -57,9 +57,9 @@ def test_the_bone_that_goes_is_the_bone_that_is_missing() -> None:
 
 
 def test_first_bone_is_on_the_face(bone: trepan.BoneVolume) -> None:
-    found = trepan.scenes.first_bone(bone, (1, 2, 9), (1, 2, -9))
+    found = trepan.first_bone(bone, (1, 2, 9), (1, 2, -9))
     assert found is not None and found[2] == pytest.approx(0, abs=0.06)
-    assert trepan.scenes.first_bone(bone, (0, 0, 9), (5, 0, 9)) is None
+    assert trepan.first_bone(bone, (0, 0, 9), (5, 0, 9)) is None
 
 
 def test_threads_share_a_bone(bone: trepan.BoneVolume) -> None:
@@ -100,6 +100,13 @@ def test_wrong_input_is_an_exception(bone: trepan.BoneVolume) -> None:
         contact.path(np.zeros((3, 3)), quaternions=np.ones((1, 4)))
     with pytest.raises(ValueError, match="tip_radius_mm is -1"):
         trepan.Tool.burr(-1)
+    with pytest.raises(ValueError, match="tip_radius_mm is 1000: it must be 0.02 to 50"):
+        trepan.Tool.burr(1000)
+    with pytest.raises(ValueError, match="within 1e6"):
+        contact.step((0, 0, 1e9))
+    coarse = trepan.VoxelVolume(np.full((4, 4, 4), 900, np.int16), np.diag([50, 50, 50, 1.0]))
+    with pytest.raises(ValueError, match="edge of a voxel in mm is 50: it must be 0.02 to 20"):
+        trepan.BoneVolume(coarse, 400)
     with pytest.raises(ValueError, match="no voxel reaches 9000 HU"):
         trepan.BoneVolume(trepan.scenes.slab(), 9000)
     tilted = trepan.scenes.slab()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import struct
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -119,7 +121,7 @@ def test_wrong_arrays_are_exceptions() -> None:
     with pytest.raises(ValueError, match="NaN or infinity"):
         trepan.resample(trepan.VoxelVolume(np.full((4, 4, 4), np.nan), np.eye(4)), 1.0, "cubic")
     with pytest.raises(ValueError, match="larger spacing"):
-        trepan.resample(floats, 1e-5)
+        trepan.resample(floats, 1e-3)
     with pytest.raises(ValueError, match="spacing_mm is -1"):
         trepan.resample(floats, -1.0)
     with pytest.raises(ValueError, match="interpolation is \"best\""):
@@ -130,6 +132,23 @@ def test_wrong_arrays_are_exceptions() -> None:
         trepan.bone_isovalue(trepan.VoxelVolume(np.array([[["a"] * 2] * 2] * 2), np.eye(4)))
     with pytest.raises(TypeError, match="volume is a ndarray: it must have .data and .affine"):
         trepan.BoneVolume(np.zeros(3), 400)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="volume is a ndarray"):
+        trepan.hounsfield(np.zeros((4, 4, 4)))  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="volume is a ndarray: it must be a VoxelVolume"):
+        trepan.resample(np.zeros((4, 4, 4)), 1.0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"volume.data has shape \(4, 4\)"):
+        trepan.resample(flat, 1.0)
+
+
+def test_other_threads_go_on_while_a_call_computes() -> None:
+    _, brain = trepan.scenes.head(2.0)
+    worker = threading.Thread(target=trepan.tetrahedra, args=(brain, 20_000))
+    worker.start()
+    turns = 0
+    while worker.is_alive():
+        time.sleep(0.002)
+        turns += 1
+    assert turns > 20
 
 
 def test_a_panic_is_an_exception(capfd: pytest.CaptureFixture[str]) -> None:

@@ -27,6 +27,7 @@ from ._trepan import (
     Tool,
     TrepanError,
 )
+from .bone import first_bone
 from .images import (
     VoxelVolume,
     bone_isovalue,
@@ -78,6 +79,7 @@ __all__ = [
     "__version__",
     "bone_isovalue",
     "distance_field",
+    "first_bone",
     "hounsfield",
     "isosurface",
     "read_mesh",

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from . import scenes
 from ._trepan import AIR_HU, BoneVolume, RigidContact, Tool
-from .images import VoxelVolume, bone_isovalue, resample
+from .bone import first_bone
+from .images import VoxelVolume, bone_isovalue, hounsfield, resample
 
 # Ticks of 1 ms in a step of the environment: the hand of a policy at 100 Hz.
 _TICKS = 10
@@ -40,7 +41,7 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     and it is truncated after ``steps``.
 
     ``reset(seed=...)`` chooses the entry: a flat bone of 4 to 8 mm with its density, or, with a
-    ``ct`` (HU, any grid), a point on the top of that skull. The same seed and actions give the same
+    ``ct`` (HU on any grid), a point on the top of that skull. The same seed and actions give the same
     observations, bit for bit. ``info`` has ``force_n``, ``plunge_mm``, ``removed_mm3``.
     """
 
@@ -58,7 +59,7 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             if not (np.isfinite(number) and number > 0):
                 raise ValueError(f"{name} is {number}: it must be over 0 and finite")
         self.render_mode = None
-        self._ct = None if ct is None else resample(ct, 1.0, "cubic", AIR_HU)
+        self._ct = None if ct is None else resample(hounsfield(ct), 1.0, "cubic", AIR_HU)
         self._isovalue = 400 if self._ct is None else bone_isovalue(self._ct)
         self._burr = Tool.burr(burr_radius_mm)
         self._speed, self._most_steps = speed_mm_s, steps
@@ -120,7 +121,7 @@ class DrillEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         middle, reach = 0.5 * (low + high), 0.2 * (high - low)
         for _ in range(100):
             x, y = self.np_random.uniform(middle[:2] - reach[:2], middle[:2] + reach[:2])
-            entry = scenes.first_bone(bone, (x, y, high[2] + 1.0), (x, y, middle[2]))
+            entry = first_bone(bone, (x, y, high[2] + 1.0), (x, y, middle[2]))
             if entry is not None:
                 below = entry - np.arange(0.0, 20.0, 0.1)[:, None] * [0.0, 0.0, 1.0]
                 outside = ~bone.is_bone(below)

@@ -63,7 +63,8 @@ def write_volume(path: str | os.PathLike[str], volume: VoxelVolume) -> None:
 
 def hounsfield(ct: VoxelVolume) -> VoxelVolume:
     """Round a CT to whole HU, int16. Raises ``TrepanError`` for values that are not of a CT."""
-    return ct.with_data(_trepan.hounsfield(ct))
+    data = _trepan.hounsfield(ct)
+    return ct.with_data(data)
 
 
 def bone_isovalue(ct: VoxelVolume) -> int:
@@ -90,15 +91,23 @@ def resample(
     ``majority`` for labels.
     """
     if isinstance(to, VoxelVolume):
-        i, j, k = to.data.shape
-        shape, affine = (i, j, k), to.affine
+        shape, affine = _shape(to), to.affine
     else:
-        i, j, k = volume.data.shape
-        shape, affine = _trepan.isotropic_over((i, j, k), volume.affine, to)
+        shape, affine = _trepan.isotropic_over(_shape(volume), volume.affine, to)
     data = _trepan.resample(volume, shape, affine, interpolation, outside)
     return VoxelVolume(data, affine)
 
 
 def distance_field(mask: VoxelVolume) -> VoxelVolume:
     """Signed distance to the border of a mask (not 0), mm, float32, negative inside."""
-    return mask.with_data(_trepan.distance_field(mask))
+    data = _trepan.distance_field(mask)
+    return mask.with_data(data)
+
+
+def _shape(volume: VoxelVolume) -> tuple[int, int, int]:
+    if not isinstance(volume, VoxelVolume):
+        raise TypeError(f"volume is a {type(volume).__name__}: it must be a VoxelVolume")
+    if volume.data.ndim != 3:
+        raise ValueError(f"volume.data has shape {volume.data.shape}, it must be (i, j, k)")
+    i, j, k = volume.data.shape
+    return i, j, k

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ._trepan import AIR_HU, BoneVolume
+from ._trepan import AIR_HU
 from .images import VoxelVolume
 
 
@@ -41,15 +41,3 @@ def head(spacing_mm: float = 2.0) -> tuple[VoxelVolume, VoxelVolume]:
     density = np.maximum(tissue, np.clip(400.0 + 1000.0 * bone, float(AIR_HU), 1200.0))
     ct = volume.with_data(np.asfortranarray(density.astype(np.int16)))
     return ct, volume.with_data(np.asfortranarray((radius < 65.0).astype(np.uint8)))
-
-
-def first_bone(bone: BoneVolume, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64] | None:
-    """First bone from one point to another, RAS mm, shape (3,), to a tenth of a voxel.
-
-    ``None`` where there is none.
-    """
-    ends = np.asarray([start, end], np.float64)
-    count = int(np.linalg.norm(ends[1] - ends[0]) / (0.1 * bone.spacing_mm)) + 2
-    points: NDArray[np.float64] = np.linspace(ends[0], ends[1], count)
-    inside = bone.is_bone(points)
-    return points[inside.argmax()] if inside.any() else None
