@@ -58,4 +58,4 @@ print(f"outer table at {np.round(outer, 1)} mm, {thickness_mm:.1f} mm of bone be
 assert 1 < thickness_mm < 20
 
 # %% [markdown]
-# Turn it with the mouse: `trepan.view.view(surface).show()` (needs `trepan[view]`).
+# Turn it with the mouse: `trepan.view.view(surface).show()` (needs PyVista).

@@ -1,10 +1,9 @@
-"""Drilling as a Gymnasium environment (``pip install trepan[gym]``)."""
+"""Drilling as a Gymnasium environment (needs gymnasium)."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +11,11 @@ from . import scenes
 from ._trepan import AIR_HU, BoneVolume, RigidContact, Tool
 from .bone import first_bone
 from .images import VoxelVolume, bone_isovalue, hounsfield, resample
+
+try:
+    import gymnasium
+except ImportError:
+    raise ImportError("trepan.gym needs Gymnasium: pip install gymnasium") from None
 
 # Ticks of 1 ms in a step of the environment: the hand of a policy at 100 Hz.
 _TICKS = 10

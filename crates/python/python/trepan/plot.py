@@ -1,4 +1,4 @@
-"""Plots of recordings with matplotlib (``pip install trepan[plot]``)."""
+"""Plots of recordings with matplotlib (needs matplotlib)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ def plot_recording(recording: Recording) -> Figure:
 
     Save it with ``figure.savefig("session.png")``; a notebook shows it by itself.
     """
-    from matplotlib.figure import Figure
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as fault:
+        raise ImportError("plot() needs matplotlib: pip install matplotlib") from fault
 
     ticks = recording.ticks
     time_s = 1e-3 * ticks["time_ms"]

@@ -123,7 +123,7 @@ class Recording:
         return {name.removeprefix("scores."): _score(name, text) for name, text in rows if _is(text)}
 
     def plot(self) -> Figure:
-        """Forces, depths and bone removed over time, with events (needs ``trepan[plot]``)."""
+        """Forces, depths and bone removed over time, with events (needs matplotlib)."""
         from .plot import plot_recording
 
         return plot_recording(self)

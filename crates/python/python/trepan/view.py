@@ -1,8 +1,8 @@
-"""Surfaces that turn under the mouse, by PyVista (``pip install trepan[view]``)."""
+"""Surfaces that turn under the mouse, by PyVista (needs pyvista)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,20 @@ if TYPE_CHECKING:
     from pyvista import PolyData as _PolyData
 
 
+def _pyvista() -> Any:
+    try:
+        import pyvista
+    except ImportError as fault:
+        raise ImportError("trepan.view needs PyVista: pip install pyvista") from fault
+    return pyvista
+
+
 def poly_data(mesh: TriMesh | TetMesh) -> _PolyData:
     """A surface, or the boundary of tetrahedra, as PyVista's ``PolyData``; points in RAS mm."""
-    import pyvista
-
     surface = mesh.surface() if isinstance(mesh, TetMesh) else mesh
     threes = np.full((len(surface.triangles), 1), 3, np.int64)
-    return pyvista.PolyData(surface.positions, np.hstack([threes, surface.triangles]).ravel())
+    data: _PolyData = _pyvista().PolyData(surface.positions, np.hstack([threes, surface.triangles]).ravel())
+    return data
 
 
 def view(
@@ -33,9 +40,8 @@ def view(
 
     Nothing opens before ``.show()``; with ``off_screen`` ``.screenshot("head.png")`` draws.
     """
-    import pyvista
-
-    plotter = pyvista.Plotter(off_screen=off_screen)
+    pyvista = _pyvista()
+    plotter: _Plotter = pyvista.Plotter(off_screen=off_screen)
     if brain is not None:
         plotter.add_mesh(poly_data(brain), color="#d9a6a0", smooth_shading=True, name="brain")
     if skull is not None:
