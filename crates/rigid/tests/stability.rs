@@ -112,3 +112,19 @@ fn a_burr_comes_out_of_its_own_bore() {
     println!("bore to {deep}, drag {worst} mm");
     assert!(!out.manifold.touches() && worst < 0.5, "drag of {worst} mm on the way out");
 }
+
+#[test]
+fn places_where_no_head_is_are_air() {
+    let wall = scanned([24, 24, 24], 0.5, |p| p.z, 1.0);
+    for far in [1e6, 1e9, 3e9, 1e20, f32::MAX] {
+        for way in [Vec3::X, Vec3::NEG_Z, Vec3::ONE] {
+            let mut contact = Method::RECOMMENDED.build(&Tool::burr(3.0));
+            contact.reset(Pose::from_translation(far * way));
+            let mut out = RigidStep::default();
+            for drilling in [false, true] {
+                contact.step(&wall, &at(far * way), drilling, 1.0, &mut out);
+                assert!(!out.manifold.touches() && out.removed_mm3 == 0.0, "{far} {way}");
+            }
+        }
+    }
+}

@@ -227,8 +227,7 @@ impl Session {
         let drawing = self.place.drawing.take();
         let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
-        let mut album = Album::default();
-        let devices = device.map(|first| Devices { first, second: second_device });
+        let (mut album, devices) = (Album::default(), device.map(|first| Devices { first, second: second_device }));
         let run = Run { stages, start, recorder, share, watching: watching.clone(), scene, stop: &stop };
         let outcome = self.loops(run, devices, |inputs| {
             album = self.picture(inputs, &mut graphics, pointer, std::mem::take(&mut company), &stop);

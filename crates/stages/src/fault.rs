@@ -21,10 +21,14 @@ const LONG_MS: f32 = 100.0;
 /// Time without contact after which the force returns, ms.
 const CLEAR_MS: f32 = 200.0;
 
+/// Farthest place of a tool from the middle of the patient's space, mm, numerical: no hand is there.
+const FARTHEST_MM: f32 = 1e4;
+
 /// Returns the reading of a device, or its last valid one at rest and `true` if it gave no usable
 /// pose.
 pub fn last_valid_state(reading: &Reading, last: ToolState) -> (ToolState, bool) {
-    let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
+    let is_sound = reading.tool.is_finite() && reading.tool.tip().abs().max_element() < FARTHEST_MM;
+    let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && is_sound;
     let at_rest = ToolState { twist: Twist::default(), time_ms: reading.tool.time_ms, ..last };
     (if fresh { reading.tool } else { at_rest }, !fresh)
 }

@@ -511,3 +511,21 @@ fn a_pause_fades_the_force_out_and_in_at_the_guards_rate() {
     }
     assert!(felt > 0.3 && least == 0.0 && (last - felt).abs() < 0.1 * felt, "{felt} N, {least} N, {last} N");
 }
+
+#[test]
+fn a_pose_that_no_hand_can_have_counts_as_none() {
+    let free = SurfacePatch::default();
+    for far in [1e5, 1e9, 3e9, 1e20, f32::MAX] {
+        for axis in [Vec3::X, Vec3::NEG_Y, Vec3::Z, Vec3::ONE, Vec3::NEG_ONE] {
+            let mut bench = Bench::new(Program::Craniotomy);
+            for z in [20.0, 5.0, 2.5] {
+                bench.step(at(z, 0.0), Status::Fresh, &free);
+            }
+            let tool = ToolState::at(Pose::from_translation(far * axis));
+            let record = bench.step(ToolState { buttons: Buttons::PEDAL, ..tool }, Status::Fresh, &free);
+            assert!(record.has(TickRecord::STALE) && record.proxy.translation.length() < 30.0, "{far} {axis}");
+            let back = bench.step(at(5.0, 0.0), Status::Fresh, &free);
+            assert!(!back.has(TickRecord::STALE) && back.proxy.translation.z > 3.0, "{far} {axis}");
+        }
+    }
+}
