@@ -21,7 +21,7 @@ const LONG_MS: f32 = 100.0;
 /// Time without contact after which the force returns, ms.
 const CLEAR_MS: f32 = 200.0;
 
-/// Farthest place of a tool from the middle of the patient's space, mm, numerical: no hand is there.
+/// Farthest place of a tool from the patient's origin, mm, numerical: no hand is there.
 const FARTHEST_MM: f32 = 1e4;
 
 /// Returns the reading of a device, or its last valid one at rest and `true` if it gave no usable
