@@ -38,7 +38,7 @@ enum Task {
     /// driver; Mesa's software driver will do
     Test,
     /// Everything that CI runs: `test`, a short headless operation, the quick validation, the
-    /// bundle for a graphics card
+    /// bundle for a graphics card, the Python package
     Ci,
     /// Run the property tests again and again, each round with a fresh, printed seed
     Fuzz {
@@ -168,8 +168,22 @@ fn ci() -> Result<()> {
     operation::check(&root())?;
     validation::check(&root())?;
     bundle::check(&root())?;
+    python(&root())?;
     println!("xtask ci: all passed");
     Ok(())
+}
+
+/// The Python package: wheel, types, tests, notebooks. Needs Python and its packages.
+fn python(root: &Path) -> Result<()> {
+    println!("crates/python/check");
+    match Command::new(root.join("crates/python/check")).status()?.code() {
+        Some(0) => Ok(()),
+        Some(75) => {
+            println!("not checked: there is no Python with venv here, or its packages cannot be fetched");
+            Ok(())
+        }
+        _ => bail!("crates/python/check failed"),
+    }
 }
 
 /// The steps that every change must pass.

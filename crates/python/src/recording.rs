@@ -86,6 +86,20 @@ impl Recording {
         Ok(out)
     }
 
+    /// One array a column, of the second hand's ticks; empty ones without it.
+    fn second<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (ticks, out) = (&self.recording.second[..], PyDict::new(py));
+        out.set_item("tick", column(py, ticks, |t| t.tick))?;
+        out.set_item("time_ms", column(py, ticks, |t| t.time_ms))?;
+        out.set_item("buttons", column(py, ticks, |t| t.buttons))?;
+        out.set_item("proxy_mm", columns(py, ticks, |t| t.proxy.translation.to_array())?)?;
+        out.set_item("proxy_quaternion", columns(py, ticks, |t| quaternion(&t.proxy))?)?;
+        out.set_item("force_n", columns(py, ticks, |t| t.wrench.force.to_array())?)?;
+        out.set_item("depth_mm", column(py, ticks, |t| t.depth_mm))?;
+        out.set_item("tissue_depth_mm", column(py, ticks, |t| t.tissue_depth_mm))?;
+        Ok(out)
+    }
+
     /// One array a column, of all solver steps.
     fn solver<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (steps, out) = (&self.recording.solver[..], PyDict::new(py));

@@ -28,6 +28,8 @@ def test_ticks_are_columns(skull_drill: Path) -> None:
     assert ticks["force_n"].shape == (3000, 3) and ticks["drilling"].dtype == bool
     assert recording.case == "case-head" and recording.app and repr(recording).startswith("Recording(")
     assert isinstance(recording.config, dict) and recording.ticks is ticks
+    second = recording.second
+    assert second["force_n"].shape == (0, 3) and len(second["tick"]) == 0
 
 
 def test_a_path_that_was_recorded_can_be_drilled_again(skull_drill: Path, case_head: Path) -> None:

@@ -100,6 +100,15 @@ class Recording:
         return self._file.ticks()
 
     @cached_property
+    def second(self) -> dict[str, NDArray[Any]]:
+        """The second hand's ticks as columns, as in :attr:`ticks`; empty arrays without that hand.
+
+        Names: ``tick``, ``time_ms``, ``buttons``, ``proxy_mm`` (n, 3), ``proxy_quaternion`` (n, 4),
+        ``force_n`` (n, 3), ``depth_mm``, ``tissue_depth_mm``.
+        """
+        return self._file.second()
+
+    @cached_property
     def solver(self) -> dict[str, NDArray[Any]]:
         """Solver steps by column: step, time_ms, max_displacement_mm, inverted, compute_us."""
         return self._file.solver()
