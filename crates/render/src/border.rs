@@ -9,6 +9,7 @@ use crate::cut::height;
 use crate::embedding::{Embedding, embeddings};
 use crate::frame::Cortex;
 use crate::touch::touch;
+use crate::walls::Walls;
 use crate::{Leaves, RenderError};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -35,6 +36,8 @@ pub(crate) struct Border {
     pub tets: Vec<[u32; 4]>,
     /// Boundary of what is left, over all nodes; empty without a cortex.
     faces: Vec<[u32; 3]>,
+    /// Walls of a hole in a cortex; their vertices come after those of the cortex.
+    walls: Walls,
     /// All nodes at rest, world mm.
     pub rest: Vec<Vec3>,
     /// All current nodes, world mm.
@@ -62,6 +65,8 @@ struct Whole {
     /// Faces of the boundary, and the same in order; empty without a cortex.
     faces: Vec<[u32; 3]>,
     known: BTreeSet<[u32; 3]>,
+    /// Whether each node is on the boundary; empty without a cortex.
+    is_rim: Vec<bool>,
     embeddings: Vec<Embedding>,
     triangles: Vec<[u32; 3]>,
     looks: Vec<Vec4>,
@@ -132,11 +137,14 @@ impl Whole {
             let looks = fine.positions.iter().zip(&normals).enumerate().map(look).collect();
             let known = surface.triangles.iter().copied().map(sorted).collect();
             let embeddings = embeddings(mesh, &fine.positions);
-            return Self { tets, faces: surface.triangles, known, embeddings, triangles, looks };
+            let mut is_rim = vec![false; mesh.positions.len()];
+            surface.triangles.iter().flatten().for_each(|n| is_rim[*n as usize] = true);
+            return Self { tets, faces: surface.triangles, known, is_rim, embeddings, triangles, looks };
         }
         let (embeddings, triangles) = on_nodes(&surface.triangles);
         let looks = vec![BARE; embeddings.len()];
-        Self { tets, faces: Vec::new(), known: BTreeSet::new(), embeddings, triangles, looks }
+        let (known, is_rim) = Default::default();
+        Self { tets, faces: Vec::new(), known, is_rim, embeddings, triangles, looks }
     }
 }
 
@@ -164,6 +172,7 @@ impl Border {
             moved_mm: 0.0,
             looks: whole.looks.clone(),
             faces: whole.faces.clone(),
+            walls: Walls::default(),
             whole,
             tets,
             rest,
@@ -183,6 +192,9 @@ impl Border {
     fn shown(&mut self) {
         self.at_rest = self.embeddings.iter().map(|embedding| embedding.place(&self.rest)).collect();
         self.places = self.embeddings.iter().map(|embedding| embedding.place(&self.now)).collect();
+        let cortex = self.whole.embeddings.len().min(self.places.len());
+        self.walls.smooth(&mut self.at_rest[cortex..]);
+        self.walls.smooth(&mut self.places[cortex..]);
         self.normals = vec![Vec3::ZERO; self.embeddings.len()];
         self.stains = vec![0.0; self.embeddings.len()];
         (self.own, self.leaves) = (self.triangles.len(), 0);
@@ -211,6 +223,7 @@ impl Border {
             self.faces.clone_from(&bared);
             bared.retain(|face| !whole.known.contains(&sorted(*face)));
             let (walls, faces) = on_nodes(&bared);
+            self.walls = Walls::of(&faces, walls.len(), |n| whole.is_rim[walls[n].nodes[0] as usize]);
             // What straddles the edge stays: it covers the gap to the wall.
             let stays = |corners: &&[u32; 3]| corners.iter().any(|n| !is_gone(whole.embeddings[*n as usize].tet));
             let first = whole.embeddings.len() as u32;
@@ -264,6 +277,8 @@ impl Border {
         self.now.copy_from_slice(positions);
         let now = &self.now;
         self.places.par_iter_mut().zip(&self.embeddings).for_each(|(place, embedding)| *place = embedding.place(now));
+        let cortex = self.whole.embeddings.len().min(self.places.len());
+        self.walls.smooth(&mut self.places[cortex..]);
         touch(&mut self.places[..self.embeddings.len()], &self.faces, &self.now, balls);
         smooth_normals(&self.places, &self.triangles, &mut self.normals);
         let ways = self.places[..self.embeddings.len()].par_iter().zip(&self.at_rest);

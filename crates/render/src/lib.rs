@@ -53,6 +53,7 @@ mod smooth;
 mod stereo;
 mod tool;
 mod touch;
+mod walls;
 
 pub use camera::{Camera, View};
 pub use cut::Cut;
