@@ -223,6 +223,11 @@ impl Dura {
         self.forces[0].force
     }
 
+    /// Lets the second hand's tip go on where the first one's was, as when an arm takes the tool.
+    pub fn hand_over(&mut self) {
+        self.forces = [TouchForce::default(), self.forces[0]];
+    }
+
     /// Lets bone hold some nodes, by the place of each at rest, world mm, and the outward
     /// direction.
     pub fn pin(&mut self, nodes: Range<usize>, mut is_held: impl FnMut(Vec3, Vec3) -> bool) {

@@ -1,14 +1,14 @@
 //! The walls of a hole, smooth: the tetrahedra that a resection leaves are coarse and jagged.
 //!
 //! # Theory
-//! Each vertex goes towards the mean of its neighbours and, by a little less, back (Taubin 1995):
+//! Each vertex goes towards the mean of its neighbours and, by a little more, back (Taubin 1995):
 //! jags of an edge's length vanish, the hole's shape stays. Vertices of the former boundary are
 //! held, so that walls meet the cortex.
 
 use glam::Vec3;
 
 /// Shares of the way to the neighbours' mean, of a round; numerical.
-const SHARES: [f32; 2] = [0.5, -0.45];
+const SHARES: [f32; 2] = [0.5, -0.53];
 /// Rounds, numerical.
 const ROUNDS: usize = 4;
 

@@ -133,7 +133,10 @@ pub fn tool_use(tray: &[Tool], recording: &Recording) -> ToolUses {
             tools[usize::from(tick.tool)].add(first, seconds);
         }
         while others.next_if(|other| other.tick < tick.tick).is_some() {}
-        let other = others.next_if(|other| other.tick == tick.tick).map(Moment::of_second);
+        let other = others.next_if(|other| other.tick == tick.tick);
+        // Before its device's first pose it is nowhere.
+        let is_there = |other: &&SecondRecord| second.held_s > 0.0 || !other.has(TickRecord::STALE);
+        let other = other.filter(is_there).map(Moment::of_second);
         other.iter().for_each(|other| second.add(*other, seconds));
         let touch = [first.on_tissue.filter(|_| is_brains), other.and_then(|other| other.on_tissue)];
         any_s += if touch.iter().any(Option::is_some) { seconds } else { 0.0 };

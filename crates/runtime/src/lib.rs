@@ -34,7 +34,7 @@ use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
-use trepan_geometry::{Buttons, ToolState, Vec3};
+use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::wire::TickRecord;
 use trepan_link::{Recorder, SceneWriter};
@@ -42,8 +42,8 @@ use trepan_soft::Loads;
 use trepan_stages::collision_step::{CollisionStage, SoftFrame, Wound};
 use trepan_stages::flap::FlapPlace;
 use trepan_stages::force_scale::ForceScale;
-use trepan_stages::haptic_tick::SecondTool;
 use trepan_stages::haptic_tick::{HapticStage, Tick, ToolSample};
+use trepan_stages::haptic_tick::{SecondTool, is_held_by_arms};
 use trepan_stages::notice::{Notice, What};
 use trepan_stages::program::Program;
 use trepan_stages::score::ScoreKeeper;
@@ -171,6 +171,20 @@ impl View {
             ..self
         }
     }
+}
+
+/// What an arm holds from some times on, ms, by recorded ticks; its force is not recorded, and NaN.
+pub fn arms(ticks: &[TickRecord], tray: &[Tool]) -> Vec<(f64, Option<SecondView>)> {
+    let asks = |tick: &TickRecord| Buttons(tick.buttons).has(Buttons::ARM);
+    let mut found: Vec<(f64, Option<SecondView>)> = Vec::new();
+    for pair in ticks.windows(2).filter(|pair| asks(&pair[1]) && !asks(&pair[0])) {
+        let tool = tray.get(usize::from(pair[0].tool)).filter(|tool| is_held_by_arms(tool.kind));
+        let is_held = found.last().is_some_and(|(_, held)| held.is_some());
+        let (world_from_tool, force) = (pair[0].proxy, Vec3::NAN);
+        let held = tool.filter(|_| !is_held).map(|tool| SecondView { tool: *tool, world_from_tool, force });
+        found.extend((is_held || held.is_some()).then_some((pair[1].time_ms, held)));
+    }
+    found
 }
 
 /// Read ends for rendering.

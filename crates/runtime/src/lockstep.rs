@@ -175,11 +175,11 @@ impl<'a> Replay<'a> {
         self.collide_up_to(record.patch_seq, clock);
         let known = self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq);
         let (patch_seq, patches) = known.copied().unwrap_or_default();
-        let (patch, arm_n) = (&patches[0], patches[1].force_n);
+        let (patch, second_n) = (&patches[0], patches[1].force_n);
         let &TickRecord { tick, device, twist, buttons, time_ms, flags, .. } = record;
         let tool = ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms };
         let reading = reading(tool, flags);
-        let input = TickInput { tick, reading, patch, patch_seq, second: self.second_place, arm_n };
+        let input = TickInput { tick, reading, patch, patch_seq, second: self.second_place, second_n };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
         }
@@ -418,7 +418,7 @@ mod tests {
                 patch: &SurfacePatch::default(),
                 patch_seq: 0,
                 second: second_place,
-                arm_n: 0.0,
+                second_n: 0.0,
             };
             recording.ticks.push(haptic.tick(&input, &mut |notice| raised.push(notice)).record);
             let free = SurfacePatch::default();

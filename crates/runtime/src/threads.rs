@@ -51,8 +51,8 @@ fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace,
         let now_ms = clock.now_ms();
         let reading = hands.owner.device.read(now_ms);
         let &(patch_seq, patches) = ends.patch.latest().0;
-        let (patch, arm_n) = (&patches[0], patches[1].force_n);
-        let input = TickInput { tick: ticks.count + 1, reading, patch, patch_seq, second: second_place, arm_n };
+        let (patch, second_n) = (&patches[0], patches[1].force_n);
+        let input = TickInput { tick: ticks.count + 1, reading, patch, patch_seq, second: second_place, second_n };
         let mut notify = |notice| {
             ticks.record(notice);
             ends.notices.send(notice);

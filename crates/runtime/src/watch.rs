@@ -168,8 +168,11 @@ impl HapticDevice for Watched {
         if sequence != self.seen {
             self.seen = sequence;
             self.received_ms = Some(time_ms);
-            // A watcher that joins late takes the tool that the trainee already holds.
-            let buttons = Buttons(record.buttons) | Buttons::slot(record.tool.into());
+            // A watcher that joins late takes the tool that the trainee already holds; an arm takes
+            // the one of before.
+            let buttons = Buttons(record.buttons);
+            let is_arms = buttons.has(Buttons::ARM);
+            let buttons = if is_arms { buttons } else { buttons | Buttons::slot(record.tool.into()) };
             self.tool = ToolState { world_from_tool: record.device, twist: record.twist, buttons, time_ms };
         }
         self.reads += 1;

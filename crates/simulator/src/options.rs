@@ -41,8 +41,8 @@ pub struct Options {
     /// Haptic device, by name
     #[arg(help_heading = "Haptic devices", long, value_name = "DEVICE", value_parser = device, help = format!("Haptic device: {} [default: mouse with a window, else a script]", trepan_haptics::usage()))]
     pub device: Option<String>,
-    /// Device of the second hand, which holds an aspirator: script:suck, simulated:NAME, or a
-    /// device that --list-devices shows
+    /// Device of the second hand, which holds an aspirator: script:aspirate, script:suck,
+    /// simulated:NAME, or a device that --list-devices shows
     #[arg(help_heading = "Haptic devices", long, value_name = "DEVICE", value_parser = device, conflicts_with = "watch")]
     pub second_device: Option<String>,
     /// Motion of the tool per motion of the hand, for devices with their own workspace; over 1,

@@ -136,8 +136,8 @@ fn operated_by(
     let mut patches = [SurfacePatch::default(); 2];
     for tick in 1..END {
         let reading = Reading { tool: hand(tick), status: Status::Fresh };
-        let arm_n = patches[1].force_n;
-        let input = TickInput { tick, reading, patch: &patches[0], patch_seq: seq, second: place, arm_n };
+        let second_n = patches[1].force_n;
+        let input = TickInput { tick, reading, patch: &patches[0], patch_seq: seq, second: place, second_n };
         let done = haptic.tick(&input, &mut |_| {});
         if let Some((second, hand)) = second.as_mut().zip(other) {
             let reading = Reading { tool: hand(tick), status: Status::Fresh };
@@ -343,6 +343,12 @@ fn an_arm_holds_a_tool_and_a_replay_holds_it_too() {
     let tools = [900, 1200].map(|tick| recording.ticks[tick].tool);
     let kinds = tools.map(|slot| Program::Integrated.tray()[usize::from(slot)].kind);
     assert_eq!(kinds, [ToolKind::Probe, ToolKind::Aspirator]);
+    // A replay of the film knows the arm by the ticks.
+    let [(from_ms, Some(in_arm))] = trepan_runtime::arms(&recording.ticks, Program::Integrated.tray())[..] else {
+        panic!("an arm that stays")
+    };
+    let off_mm = in_arm.world_from_tool.translation.distance(hand(950).tip());
+    assert!(from_ms == 950.0 && in_arm.tool.kind == ToolKind::Probe && off_mm < 0.1, "{from_ms} ms, {off_mm} mm");
     assert_eq!(replayed(&recording).0, END - 1);
 }
 

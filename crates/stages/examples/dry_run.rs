@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for tick in 1..=10_000u64 {
         let reading = device.read(tick as f64);
         let input =
-            TickInput { tick, reading, patch: &SurfacePatch::default(), patch_seq: 0, second: None, arm_n: 0.0 };
+            TickInput { tick, reading, patch: &SurfacePatch::default(), patch_seq: 0, second: None, second_n: 0.0 };
         let done = stage.tick(&input, &mut |notice| println!("{:6.3} s  {}", notice.time_ms * 1e-3, notice.words().1));
         device.apply(done.wrench);
         if tick % 1000 == 0 {

@@ -55,7 +55,7 @@ impl CollisionStage {
         let step = &mut self.steps[hand];
         match tool.and_then(|tool| Some((self.tools.get_mut(tool.slot)?, tool.state))) {
             Some((tissue, state)) => tissue.step(&soft.positions, &soft.velocities, &state, step),
-            None => *step = TissueStep { patch: SurfacePatch::default(), points_in_contact: 0, ..std::mem::take(step) },
+            None => (step.patch, step.points_in_contact) = (SurfacePatch::default(), 0),
         }
         let couple_mm = if self.with_torque { step.patch.couple_mm } else { Vec3::ZERO };
         self.patches[hand] = SurfacePatch { tissue_ms: soft.time_ms, couple_mm, ..step.patch };

@@ -63,12 +63,14 @@ pub(crate) struct Membrane {
     next: usize,
     /// Whether the scalpel was in the hand.
     incised: bool,
+    /// Slot of the tool in the hand, and of the second one.
+    slots: (usize, Option<usize>),
     shown: u32,
 }
 
 impl Membrane {
     pub fn of(dura: Dura, bone: Arc<BoneVolume>) -> Self {
-        Self { dura, bone, next: 0, incised: false, shown: 0 }
+        Self { dura, bone, next: 0, incised: false, slots: (0, None), shown: 0 }
     }
 
     /// Whether fluid can leave.
@@ -90,6 +92,11 @@ impl Membrane {
         let is_scalpel = sample.tool.kind == ToolKind::Scalpel;
         if std::mem::replace(&mut self.incised, is_scalpel) && !is_scalpel {
             self.dura.hold_back();
+        }
+        let slots = (sample.slot, sample.second.map(|second| second.slot));
+        let before = std::mem::replace(&mut self.slots, slots);
+        if before.1.is_none() && slots.1 == Some(before.0) {
+            self.dura.hand_over();
         }
         let tips = sample.tools().map(|tool| {
             let SecondTool { tool, state, .. } = tool.filter(|tool| Phase::of(&tool.tool) == Phase::Brain)?;
@@ -199,5 +206,26 @@ mod tests {
         assert!(stage.aspirated_mm3() > 1.0 && stage.wound().dura.torn == 0, "{} mm³", stage.aspirated_mm3());
         let moved = stage.wound().dura.places.iter().zip(&dura.places).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
         assert!(moved > 2.0, "{moved} mm");
+    }
+
+    #[test]
+    fn an_arm_takes_a_tool_over_the_dura_with_its_force() {
+        let (mut stage, brain) = stage();
+        let [spatula, aspirator] = [5, 6].map(|slot| (slot, Program::Integrated.tray()[slot]));
+        let at = Vec3::new(24.0, 24.3, 17.5);
+        let pressed_n = lead(&mut stage, &brain, spatula.0, [at + 6.0 * Vec3::Z, at], 1);
+        let before_n = stage.patch().force_n;
+        for tick in 1001..1500u64 {
+            let mut state = ToolState::at(Pose::from_translation(at));
+            state.time_ms = tick as f64;
+            let second = Some(SecondTool { tool: spatula.1, slot: spatula.0, state });
+            let (slot, tool) = aspirator;
+            stage.step(&ToolSample { tick, state, tool, slot, drilling: false, second, idle: true }, &brain);
+            let [hand, arm] = stage.patches();
+            assert!((arm.force_n - before_n).abs() < 0.1 * before_n, "{} of {before_n} N at {tick}", arm.force_n);
+            let of_brain_n = hand.force_n;
+            assert!(of_brain_n < 0.2, "the hand's own tool feels no dura: {of_brain_n} N");
+        }
+        assert!(pressed_n > 0.8 && stage.wound().dura.torn == 0, "{pressed_n} N");
     }
 }

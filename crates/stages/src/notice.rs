@@ -203,7 +203,7 @@ impl NoArm {
 pub enum Hindrance {
     /// The tool lies in bone that would be restored.
     Tool,
-    /// The second hand's tool lies in bone that would be restored.
+    /// The second hand's tool, or an arm's, lies where bone would be restored.
     SecondTool,
     /// The pedal is down.
     Pedal,
@@ -248,7 +248,7 @@ impl Hindrance {
     fn text(self) -> String {
         let text = match self {
             Self::Tool => "the tool lies in the bone that would be restored: it is undone once the tool is out",
-            Self::SecondTool => "the second hand's tool lies in the bone that would be restored: draw it out first",
+            Self::SecondTool => "the other tool is in the way: draw it out first, or take the arm away",
             Self::Pedal => "the pedal is down: let it go first",
             Self::BrainTool => "a tool for the brain is in the hand: take one for bone first",
             Self::FlapMoves => "the flap is moving: wait until it rests",

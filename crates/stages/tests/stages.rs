@@ -52,7 +52,7 @@ impl Bench {
             patch,
             patch_seq: 1,
             second: self.second.map(ToolState::at),
-            arm_n: 0.0,
+            second_n: 0.0,
         };
         let done = self.stage.tick(&input, &mut |notice| self.notices.push(notice));
         let force = done.wrench.force();

@@ -133,8 +133,14 @@ fn an_arm_holds_the_brain_aside_until_it_is_taken_away() {
     for tick in 1..=2600 {
         let tool = hand_of_arm(tick, [550, 1500]);
         let reading = Reading { tool, status: Status::Fresh };
-        let input =
-            TickInput { tick, reading, patch: &patches[0], patch_seq: tick, second: None, arm_n: patches[1].force_n };
+        let input = TickInput {
+            tick,
+            reading,
+            patch: &patches[0],
+            patch_seq: tick,
+            second: None,
+            second_n: patches[1].force_n,
+        };
         let done = hand.tick(&input, &mut |notice| notices.push(notice.what));
         bench.step(&done.sample);
         patches = *bench.collision.patches();
@@ -172,7 +178,7 @@ fn an_arm_holds_blunt_tools_and_one_at_a_time() {
         let reading = Reading { tool: at(tick as f32 * Vec3::Z, buttons, tick), status: Status::Fresh };
         let second = (tick == 21).then_some(second);
         let patch = &SurfacePatch { time_ms: tick as f64, ..SurfacePatch::default() };
-        let input = TickInput { tick, reading, patch, patch_seq: tick, second, arm_n: 0.0 };
+        let input = TickInput { tick, reading, patch, patch_seq: tick, second, second_n: 0.0 };
         hand.tick(&input, &mut |notice| notices.push(notice.what));
     }
     notices.retain(|what| !matches!(what, What::Phase(_) | What::Warning(..)));

@@ -57,7 +57,8 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     // Only the force of bone is scaled.
     let bone_scale = if sample.phase() == Phase::Brain { 1.0 } else { view.force_scale.0 };
     let of = |second: &SecondView| if second.tool == SecondHand::tool() { "second hand" } else { IN_ARM };
-    let second = view.second.map(|second| value(of(&second), format!("{:.2} N", second.force.length())));
+    let second = view.second.filter(|second| second.force.is_finite());
+    let second = second.map(|second| value(of(&second), format!("{:.2} N", second.force.length())));
     Panel {
         case: case.into(),
         phase: ["Craniotomy", "Brain"][sample.phase() as usize].into(),

@@ -19,10 +19,10 @@ use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::{Camera, Frame, Image, Painter};
 use trepan_report::printable::capital;
-use trepan_runtime::View;
 use trepan_runtime::film::{Shot, position};
 use trepan_runtime::lockstep::up_to;
 use trepan_runtime::stop::Stop;
+use trepan_runtime::{View, arms};
 use trepan_stages::program::Program;
 use trepan_stages::second_hand::{SecondHand, SecondView};
 use trepan_window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
@@ -119,6 +119,8 @@ struct Player {
     now_s: Option<f64>,
     first: View,
     recording: Arc<Recording>,
+    /// What an arm holds, from times on, ms.
+    arms: Vec<(f64, Option<SecondView>)>,
     program: Program,
     shown: ViewState,
     hint: String,
@@ -143,6 +145,7 @@ pub(crate) fn show(
         now_s: None,
         first,
         recording: recording.clone(),
+        arms: arms(&recording.ticks, opened.table.program.tray()),
         program: opened.table.program,
         shown: ViewState::of(opened, bone.is_some(), stop),
         hint: recording.losses().map_or_else(|| HINT.into(), |losses| format!("not a whole recording: {losses}")),
@@ -225,7 +228,9 @@ impl Player {
             world_from_tool: tick.proxy,
             force: tick.wrench.force,
         };
-        View { second: second.map(held).or(view.second), ..view }
+        let arm = self.arms.partition_point(|(from_ms, _)| *from_ms <= at_ms).checked_sub(1);
+        let in_arm = arm.and_then(|at| self.arms[at].1);
+        View { second: second.map(held).or(in_arm).or(view.second), ..view }
     }
 
     /// The newest event while it is recent, and how far the film is if it is behind.

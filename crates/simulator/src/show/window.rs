@@ -27,6 +27,7 @@ use trepan_runtime::watch::{PeerSession, Watching};
 use trepan_runtime::{RenderInputs, View};
 use trepan_stages::Bleeding;
 use trepan_stages::collision_step::Wound;
+use trepan_stages::haptic_tick::is_held_by_arms;
 use trepan_stages::notice::Notice;
 use trepan_stages::program::Program;
 use trepan_window::{self as window, Action, Capture, Leash, Panel, Ray, Stage, Start, SurfaceHit, WindowInput};
@@ -345,7 +346,7 @@ impl window::Session for Show {
             name: name.into(),
             key: Some(key),
             why_not: no_flap.clone().filter(|_| button == Buttons::FLAP),
-            on: button == Buttons::ARM && view.second.is_some(),
+            on: button == Buttons::ARM && view.second.is_some_and(|second| is_held_by_arms(second.tool.kind)),
         };
         let own = if by_hand { self.shown.actions() } else { Vec::new() };
         let mut panel = self.shown.panel(view, &self.brain, by_hand);

@@ -22,6 +22,11 @@ pub struct SecondTool {
     pub state: ToolState,
 }
 
+/// Whether an arm holds tools of a kind: those that neither cut nor suck.
+pub fn is_held_by_arms(kind: ToolKind) -> bool {
+    matches!(kind, ToolKind::Spatula | ToolKind::Probe)
+}
+
 /// State of the arm.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Arm {
@@ -58,11 +63,10 @@ impl HapticStage {
             self.arm.asked = pressed;
             return;
         }
-        let is_blunt = matches!(self.tool().kind, ToolKind::Spatula | ToolKind::Probe);
         match self.arm.held.take() {
             Some(_) => report(What::ArmGone),
             None if input.second.is_some() => report(What::NoArm(NoArm::SecondHand)),
-            None if !is_blunt => report(What::NoArm(NoArm::Tool)),
+            None if !is_held_by_arms(self.tool().kind) => report(What::NoArm(NoArm::Tool)),
             None => {
                 self.hold(self.tray.slot(), self.proxy, tool.time_ms);
                 let held = self.tool();
@@ -82,8 +86,10 @@ impl HapticStage {
         self.arm.held = self.config.program.tray().get(slot).map(|tool| SecondTool { tool: *tool, slot, state });
     }
 
-    /// Takes over what the arm of another session holds, before the first tick.
+    /// Takes over what the arm of another session holds, before the first tick. Its button may
+    /// still be down.
     pub fn restore_arm(&mut self, slot: usize, world_from_tool: Pose) {
+        self.arm.asked = true;
         self.hold(slot, world_from_tool, 0.0);
     }
 

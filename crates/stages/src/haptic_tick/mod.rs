@@ -26,7 +26,7 @@ mod arm;
 mod requests;
 
 pub use crate::tissue::{FRESH_MS, GONE_MS};
-pub use arm::SecondTool;
+pub use arm::{SecondTool, is_held_by_arms};
 
 use crate::alarms::{Feed, Pace, WarningInputs};
 use crate::drill::{Drill, REACH_MM, remaining_thickness_mm};
@@ -111,8 +111,8 @@ pub struct TickInput<'a> {
     pub patch_seq: u64,
     /// The second hand's tool after the last tick; `None` without one.
     pub second: Option<ToolState>,
-    /// Force of the tissue on the tool that an arm holds, N.
-    pub arm_n: f32,
+    /// Force of the tissue on the second hand's tool, or an arm's, N: it warns as the first's does.
+    pub second_n: f32,
 }
 
 /// The tool as sent to the other threads.
@@ -489,12 +489,12 @@ impl HapticStage {
     fn warn(
         &mut self,
         record: &TickRecord,
-        &TickInput { patch, arm_n, .. }: &TickInput<'_>,
+        &TickInput { patch, second_n, .. }: &TickInput<'_>,
         sample: &ToolSample,
         (bone, desired): (BoneContact, DesiredWrench),
         report: &mut dyn FnMut(What),
     ) {
-        let inputs = self.warning_inputs(record, sample, bone.ahead_mm, patch, (desired, arm_n));
+        let inputs = self.warning_inputs(record, sample, bone.ahead_mm, patch, (desired, second_n));
         for (warning, present, value) in inputs.causes(record, &self.config.limits) {
             self.watch.update(warning, present, value, record.time_ms).into_iter().for_each(&mut *report);
         }
@@ -507,7 +507,7 @@ impl HapticStage {
         sample: &ToolSample,
         ahead_mm: f32,
         patch: &SurfacePatch,
-        (desired, arm_n): (DesiredWrench, f32),
+        (desired, second_n): (DesiredWrench, f32),
     ) -> WarningInputs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
@@ -517,7 +517,7 @@ impl HapticStage {
             craniotome,
             ahead_mm,
             breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
-            tissue_n: record.tissue_n().max(arm_n),
+            tissue_n: record.tissue_n().max(second_n),
             rest_n: if phase == Phase::Brain { desired.bone.force.length() } else { 0.0 },
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
             desired_n: desired.sum().force.length(),

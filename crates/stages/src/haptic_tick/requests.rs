@@ -98,6 +98,7 @@ impl HapticStage {
             (drilling, Hindrance::Pedal),
             (!self.is_free(), Hindrance::Touches),
             (self.undo.runs(), Hindrance::UndoRuns),
+            (self.arm.slot().is_some(), Hindrance::SecondTool),
         ];
         let hinders = hinders.into_iter().find_map(|(stands, why)| stands.then_some(why));
         let cut = self.bone_step.removed_mm3 > 0.0;

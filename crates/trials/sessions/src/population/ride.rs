@@ -127,7 +127,7 @@ fn operate(mut stages: Stages, mut device: Box<dyn HapticDevice>, milliseconds: 
     for ms in 1..=milliseconds {
         let time_ms = ms as f64;
         let (reading, (patch_seq, patch)) = (device.read(time_ms), &newest);
-        let input = TickInput { tick: ms, reading, patch, patch_seq: *patch_seq, second: None, arm_n: 0.0 };
+        let input = TickInput { tick: ms, reading, patch, patch_seq: *patch_seq, second: None, second_n: 0.0 };
         let mut notices = Vec::new();
         let tick = stages.haptic.tick(&input, &mut |notice| notices.push(notice));
         device.apply(tick.wrench);

@@ -172,7 +172,7 @@ fn run(
     for ms in 1..=milliseconds {
         let tool = ToolState { time_ms: ms as f64, ..path.at(ms as f64) };
         let reading = Reading { tool, status: Status::Fresh };
-        let input = TickInput { tick: ms, reading, patch: &patch.1, patch_seq: patch.0, second: None, arm_n: 0.0 };
+        let input = TickInput { tick: ms, reading, patch: &patch.1, patch_seq: patch.0, second: None, second_n: 0.0 };
         let tick = haptic.timed(|| stages.haptic.tick(&input, &mut |_| {}));
         let record = collision.timed(|| tissue.collision.step(&tick.sample, &frame));
         patch = (record.seq, *tissue.collision.patch());

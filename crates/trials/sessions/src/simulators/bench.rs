@@ -59,7 +59,7 @@ impl Bench {
             let tool = ToolState { time_ms: tick as f64 * self.dt_ms, ..reading.tool };
             let reading = trepan_haptics::Reading { tool, ..reading };
             let notices = &mut self.notices;
-            let input = TickInput { tick, reading, patch: &NO_PATCH, patch_seq: 0, second: None, arm_n: 0.0 };
+            let input = TickInput { tick, reading, patch: &NO_PATCH, patch_seq: 0, second: None, second_n: 0.0 };
             let done = self.stage.tick(&input, &mut |notice| notices.push(notice));
             self.hand.apply(done.wrench);
             self.records.push(done.record);

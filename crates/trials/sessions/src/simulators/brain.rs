@@ -150,7 +150,7 @@ fn press(brain: &RestBrain, tumour: Option<Vec3>, entry: Vec3, inward: Vec3) -> 
     for tick in 1..=end {
         let reading = Reading { tool: at(tick as f64), status: Status::Fresh };
         let done = haptic.tick(
-            &TickInput { tick, reading, patch: collision.patch(), patch_seq: seq, second: None, arm_n: 0.0 },
+            &TickInput { tick, reading, patch: collision.patch(), patch_seq: seq, second: None, second_n: 0.0 },
             &mut |_| {},
         );
         solver.publish(&mut frame);

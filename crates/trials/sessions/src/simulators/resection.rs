@@ -49,7 +49,7 @@ fn resect(quality: &str, findings: &mut Findings) -> Result<()> {
     let (mut last, mut most_n, mut most_step_n, mut opened_ms) = (Vec3::ZERO, 0.0f32, 0.0f32, None);
     for tick in 1..=END_MS {
         let (reading, (patch_seq, patch)) = (script.read(tick as f64), &newest);
-        let input = TickInput { tick, reading, patch, patch_seq: *patch_seq, second: None, arm_n: 0.0 };
+        let input = TickInput { tick, reading, patch, patch_seq: *patch_seq, second: None, second_n: 0.0 };
         let done = stages.haptic.tick(&input, &mut |_| {});
         // Nothing acts on the brain before.
         if done.sample.phase() != Phase::Brain {

@@ -183,7 +183,7 @@ fn press_by_hand(scene: &Scene, mesh: &TetMesh, hand: HandModel) -> Result<Vec<F
             bench.collide(reading.tool.tip(), reading.tool.twist.linear);
             patch = SurfacePatch { time_ms: tick as f64, ..bench.out.patch };
         }
-        let input = TickInput { tick, reading, patch: &patch, patch_seq: tick, second: None, arm_n: 0.0 };
+        let input = TickInput { tick, reading, patch: &patch, patch_seq: tick, second: None, second_n: 0.0 };
         let wrench = stage.tick(&input, &mut |_| ()).wrench;
         device.apply(wrench);
         forces.push(wrench.force());
