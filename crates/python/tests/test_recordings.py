@@ -119,6 +119,11 @@ def test_a_session_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
         trepan.session.run(timeout_s=0.5, out=tmp_path / "out")
 
 
+def interruptible() -> None:
+    """Undoes what a job in the background inherits: that Ctrl-C is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_ctrl_c_ends_a_session_in_order(tmp_path: Path) -> None:
     script = f"""
@@ -134,6 +139,7 @@ time.sleep(60)"""
         env=os.environ | {"TREPAN_BIN": str(tmp_path / "bin")},
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=interruptible,
     )
     until = time.monotonic() + 30
     while not (tmp_path / "begun").exists() and time.monotonic() < until:
@@ -162,9 +168,16 @@ solver = trepan.Tled(mesh, np.flatnonzero(mesh.positions[:, 2] < 1), trepan.Mate
 print("begun", flush=True)
 solver.step(trepan.Loads(), steps=2**31)"""
     python = subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=interruptible,
     )
-    assert python.stdout is not None and python.stdout.readline() == "begun\n"
-    time.sleep(0.3)
-    python.send_signal(signal.SIGINT)
-    assert "KeyboardInterrupt" in python.communicate(timeout=30)[1]
+    try:
+        assert python.stdout is not None and python.stdout.readline() == "begun\n"
+        time.sleep(0.3)
+        python.send_signal(signal.SIGINT)
+        assert "KeyboardInterrupt" in python.communicate(timeout=30)[1]
+    finally:
+        python.kill()
