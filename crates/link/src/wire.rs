@@ -118,7 +118,7 @@ pub struct SecondRecord {
     pub wrench: Wrench,
     /// Penetration depth in bone, mm.
     pub depth_mm: f32,
-    /// Penetration depth in the brain at rest, mm.
+    /// Penetration depth in the brain, mm; at rest where none deforms.
     pub tissue_depth_mm: f32,
     /// Flags as in [`TickRecord`]: `STALE`, `LOST`, `RELEASED`, `CLAMPED`.
     pub flags: u32,
