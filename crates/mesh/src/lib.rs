@@ -35,6 +35,7 @@ pub mod lattice;
 pub mod materials;
 mod nets;
 mod quality;
+mod split;
 mod surface;
 mod tets;
 mod topology;
@@ -49,6 +50,7 @@ pub use file::{
 pub use isosurface::isosurface;
 pub use nets::surface_nets;
 pub use quality::Quality;
+pub use split::{Split, Splitter};
 pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};
 pub use topology::{Csr, NONE, Topology};

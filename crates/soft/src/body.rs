@@ -3,7 +3,7 @@
 use crate::{Anchor, Material, MaterialError, Membrane, Shape};
 use glam::DVec3;
 use trepan_geometry::Vec3;
-use trepan_mesh::{Csr, TetMesh, Topology};
+use trepan_mesh::{Csr, Split, TetMesh, Topology};
 
 /// A deformable body in its rest state.
 #[derive(Clone, Debug, PartialEq)]
@@ -260,6 +260,37 @@ impl Body {
         }
     }
 
+    /// Splits nodes where faces are cut; what a node is (fixed, anchored, of the membrane) its copy
+    /// is too. `None`, and no change, where a split does not fit the mesh.
+    ///
+    /// A held body stays held: of each part that nothing holds any more one node is tied to its
+    /// place by a spring of 0.001 N/mm.
+    pub fn split(&mut self, splits: &[Split]) -> Option<()> {
+        let mut mesh = self.mesh.clone();
+        mesh.split(splits)?;
+        let mut copies: Vec<[u32; 2]> = splits.iter().map(|split| [split.from, split.node]).collect();
+        copies.dedup();
+        for [from, node] in copies {
+            let held = self.fixed.contains(&from).then_some(node);
+            self.fixed.extend(held);
+            let anchor = self.anchors.iter().rfind(|anchor| anchor.node == from).map(|of| Anchor { node, ..*of });
+            self.anchors.extend(anchor);
+        }
+        for split in splits {
+            let (tet, corner) = split.place();
+            let corners = &mut self.mesh.tets[tet];
+            let on_it = self.membrane.triangles.iter_mut().filter(|t| t.iter().all(|n| corners.contains(n)));
+            on_it.flatten().filter(|n| **n == split.from).for_each(|n| *n = split.node);
+            corners[corner] = split.node;
+        }
+        self.mesh = mesh;
+        while let Err(BodyError::Loose(tet)) = self.check() {
+            let node = self.mesh.tets[tet][0];
+            self.anchors.push(Anchor { node, normal: Vec3::Z, along: TIE, across: TIE, ..Anchor::default() });
+        }
+        Some(())
+    }
+
     /// Rest shape of a tetrahedron, f64.
     pub fn shape(&self, tet: usize) -> Shape {
         Shape::of(self.mesh.corners(tet).map(Vec3::as_dvec3))
@@ -298,6 +329,9 @@ impl Body {
         self.loose(self.fixed_mask(), span_a_plane)
     }
 }
+
+/// Spring that ties a loose part, N/mm; numerical.
+const TIE: f32 = 1e-3;
 
 fn span_a_plane(points: &[DVec3]) -> bool {
     let Some(&origin) = points.first() else { return false };
@@ -363,6 +397,34 @@ mod tests {
         let bad = Material::NeoHookean { young_mpa: -1.0, poisson: 0.3, density_g_mm3: 1e-3 };
         let body = Body { materials: vec![Material::BRAIN, bad], ..cube() };
         assert!(body.check().unwrap_err().to_string().starts_with("materials[1]: young_mpa"));
+    }
+
+    #[test]
+    fn a_body_that_is_cut_through_keeps_what_its_nodes_were_and_ties_what_is_loose() {
+        let mut body = cube();
+        body.membrane.triangles = trepan_mesh::Surface::of(&body.mesh).triangles;
+        body.anchors = vec![Anchor { node: 13, along: 2.0, ..Anchor::default() }];
+        let (mut splitter, mut splits) = (trepan_mesh::Splitter::of(&body.mesh), Vec::with_capacity(200));
+        let is_low = |tet: usize| body.mesh.corners(tet).iter().all(|p| p.z <= 5.0);
+        for (tet, face) in (0..48u32).flat_map(|tet| (0..4).map(move |face| (tet, face))) {
+            let next = splitter.neighbours(tet)[face];
+            if next != trepan_mesh::NONE && is_low(tet as usize) != is_low(next as usize) {
+                splitter.cut(tet, face, |_| false, &mut splits);
+            }
+        }
+        let mut cut = body.clone();
+        cut.split(&splits).unwrap();
+        assert_eq!((cut.check(), cut.mesh.positions.len()), (Ok(()), 27 + 9));
+        let ends = |triangle: &[u32; 3]| trepan_mesh::Surface::of(&cut.mesh).triangles.contains(triangle);
+        assert!(cut.membrane.triangles.iter().all(ends), "the membrane is cut too");
+        let [given, copied] = [0, 1].map(|n| cut.anchors[n]);
+        assert!(copied == Anchor { node: copied.node, ..given } && copied.node >= 27 && cut.anchors.len() == 2);
+        let mut loose = Body { anchors: Vec::new(), ..body.clone() };
+        loose.split(&splits).unwrap();
+        assert!(loose.check() == Ok(()) && loose.anchors.len() == 1 && loose.anchors[0].along == TIE);
+        assert!(cut.clone().split(&[Split { corner: 0, from: 0, node: 99 }]).is_none());
+        let total: f64 = cut.lumped_masses_g().iter().sum();
+        assert!((total - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::Fluid;
 use glam::DVec3;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
-use trepan_mesh::TetMesh;
+use trepan_mesh::{Split, TetMesh};
 
 /// Advances a body under loads. One implementation owns all of a body's nodal state.
 ///
@@ -50,13 +50,20 @@ pub trait SoftSolver: Send {
         None
     }
 
+    /// Maker of a solver of the same body with nodes split where it was cut; `None` where there is
+    /// none. Splits are those since this solver was made, in their order.
+    fn split(&self, _splits: &[Split]) -> Option<MakeSolver> {
+        None
+    }
+
     /// Stress memory, in an order of its own; empty without one.
     fn memory(&self) -> Vec<f32> {
         Vec::new()
     }
 
-    /// Goes on from the state and the stress memory of the solver that [`cheaper`](Self::cheaper)
-    /// came from. A solver that nobody calls cheaper does nothing.
+    /// Goes on from the state and the stress memory of the solver that [`cheaper`](Self::cheaper) or
+    /// [`split`](Self::split) came from, with the copies of nodes. One that has neither does
+    /// nothing.
     fn resume(&mut self, _state: &NodeState, _memory: &[f32]) {}
 }
 
@@ -78,6 +85,16 @@ impl NodeState {
         Self { positions: mesh.positions.clone(), velocities: vec![Vec3::ZERO; mesh.positions.len()] }
     }
 
+    /// Adds copies of nodes, each where its node is.
+    pub fn split(&mut self, splits: &[Split]) {
+        for Split { from, node, .. } in splits {
+            if *node as usize == self.positions.len() {
+                self.positions.push(self.positions[*from as usize]);
+                self.velocities.push(self.velocities[*from as usize]);
+            }
+        }
+    }
+
     /// Rounds the state of a node.
     pub(crate) fn set(&mut self, node: usize, position: DVec3, velocity: DVec3) {
         (self.positions[node], self.velocities[node]) = (position.as_vec3(), velocity.as_vec3());
@@ -97,6 +114,9 @@ pub struct Loads {
     /// nothing is resected. Whoever moves the loads gives them to
     /// [`lower_fills`](SoftSolver::lower_fills).
     pub fills: Vec<u16>,
+    /// Splits of nodes by all cuts so far. Whoever moves the loads has a solver with them made, by
+    /// [`split`](SoftSolver::split).
+    pub splits: Vec<Split>,
 }
 
 /// What happened in one step; every count is of this step alone.

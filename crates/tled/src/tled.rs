@@ -2,11 +2,13 @@
 
 use crate::averaging::Averaging;
 use crate::base::{Base, left_of};
-use crate::config::Config;
+use crate::config::{Config, Damping};
 use crate::elements::Elements;
 use crate::nodes::{Nodes, Update, kick_ms};
 use crate::part::CALM;
 use trepan_geometry::Vec3;
+use trepan_mesh::Split;
+use trepan_soft::simd::Layout;
 use trepan_soft::{
     Body, BodyError, Fluid, FreeNode, Gain, ImplicitSprings, Loads, MakeSolver, NodeState, SoftSolver, StepReport,
     SurfacePressure,
@@ -68,6 +70,23 @@ impl SoftSolver for Tled {
         let (body, pressure, fills) = (self.body.clone(), self.pressure.clone(), self.fills().to_vec());
         Some(Box::new(move || {
             let mut solver = Self { pressure, ..Self::new(&body, &config).ok()? };
+            solver.elements.empty_to(&fills, &body, &solver.base.layout);
+            Some(Box::new(solver))
+        }))
+    }
+
+    /// The same, with its elements in the same order.
+    fn split(&self, splits: &[Split]) -> Option<MakeSolver> {
+        let damping = Damping::Rate(self.base.damping_per_ms);
+        let config = Config { damping, ..self.base.config };
+        let (mut body, fills, splits) = (self.body.clone(), self.fills().to_vec(), splits.to_vec());
+        let Layout { node_at, tet_at, .. } = &self.base.layout;
+        let (tet_at, mut pressure) = (tet_at.clone(), self.pressure.clone());
+        pressure.triangles.iter_mut().flatten().for_each(|place| *place = node_at[*place as usize]);
+        Some(Box::new(move || {
+            body.split(&splits)?;
+            let mut solver = Self::in_order(&body, &config, Some(tet_at)).ok()?;
+            solver.set_pressure(pressure);
             solver.elements.empty_to(&fills, &body, &solver.base.layout);
             Some(Box::new(solver))
         }))
@@ -164,7 +183,13 @@ impl Tled {
     /// Creates a solver for a body at rest: orders it for the cache, precomputes gradients, finds
     /// the stable step and the damping.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
-        let (base, masses, scaling) = Base::of(body, config)?;
+        Self::in_order(body, config, None)
+    }
+
+    /// The same, with the tetrahedra in a given order.
+    fn in_order(body: &Body, config: &Config, tet_at: Option<Vec<u32>>) -> Result<Self, BodyError> {
+        let (mut base, masses, scaling) = Base::of(body, config)?;
+        base.layout.tet_at = tet_at.unwrap_or(base.layout.tet_at);
         let averages = base.config.selective_mass_scaling;
         let averaging = averages
             .then(|| Averaging::of(body, &base.layout, (&scaling, base.bound.stiffest), base.membrane_masses_g(body)));
