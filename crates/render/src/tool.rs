@@ -43,7 +43,7 @@ impl ToolShape {
             ToolKind::Craniotome => (CRANIOTOME, 3.0),
             ToolKind::Spatula => (SPATULA, round_mm),
             ToolKind::Aspirator => (TUBE, round_mm),
-            ToolKind::Bipolar => (TINES, 6.0),
+            ToolKind::Bipolar | ToolKind::Scissors => (TINES, 6.0),
             ToolKind::Scalpel => (SCALPEL, 2.8),
         };
         Self {

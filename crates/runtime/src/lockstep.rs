@@ -282,6 +282,9 @@ impl<'a> Replay<'a> {
         if last.is_some_and(|last| last.cheaper > 0) {
             tissue.solver.wait_for_cheaper();
         }
+        if let Some(last) = last.filter(|last| last.splits as usize > tissue.solver.splits().len()) {
+            tissue.solver.wait_for_splits(&self.load.1, last.splits as usize);
+        }
         let began_ms = clock.now_ms();
         let record = tissue.solver.step(&self.load.1, self.load.0);
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;

@@ -101,6 +101,9 @@ fn collision_loop(
             (loads.gravity, loads.fluid) = (stage.loads().gravity, stage.loads().fluid);
             loads.contacts.copy_from(&stage.loads().contacts);
             loads.fills.clone_from(&stage.loads().fills);
+            if loads.splits.len() != stage.loads().splits.len() {
+                loads.splits.clone_from(&stage.loads().splits);
+            }
         });
         ends.wound.write(|wound| wound.copy_from(stage.wound()));
         ends.asked.iter_mut().for_each(|asked| asked.answer(&stage));
@@ -139,6 +142,7 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
         }
         let (seq, loads) = ends.loads.latest().0;
         let record = stage.step(loads, *seq);
+        stage.ask_for_splits();
         ends.soft.write(|frame| stage.publish(frame));
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         times.add_us(us);

@@ -50,8 +50,8 @@ pub trait SoftSolver: Send {
         None
     }
 
-    /// Maker of a solver of the same body with nodes split where it was cut; `None` where there is
-    /// none. Splits are those since this solver was made, in their order.
+    /// Maker of a solver of the same body with nodes split where it was cut; `None` for none.
+    /// Splits are those since this solver was made, in their order.
     fn split(&self, _splits: &[Split]) -> Option<MakeSolver> {
         None
     }
@@ -61,10 +61,15 @@ pub trait SoftSolver: Send {
         Vec::new()
     }
 
-    /// Goes on from the state and the stress memory of the solver that [`cheaper`](Self::cheaper) or
-    /// [`split`](Self::split) came from, with the copies of nodes. One that has neither does
-    /// nothing.
-    fn resume(&mut self, _state: &NodeState, _memory: &[f32]) {}
+    /// Present fill of each tetrahedron, in 65,535ths; empty where nothing is taken away.
+    fn fills(&self) -> &[u16] {
+        &[]
+    }
+
+    /// Goes on from the state, the fills and the stress memory of the solver that
+    /// [`cheaper`](Self::cheaper) or [`split`](Self::split) came from; of the latter with its
+    /// splits. One that has neither does nothing.
+    fn resume(&mut self, _from: &dyn SoftSolver, _splits: &[Split]) {}
 }
 
 /// Makes a solver on any thread; `None` if the body is refused.

@@ -22,7 +22,7 @@
 
 use std::f32::consts::PI;
 use trepan_deformable::TissueCollision;
-use trepan_mesh::{TetMesh, Topology};
+use trepan_mesh::{NONE, TetMesh, Topology};
 
 /// Fill of a whole tetrahedron, and that below which it goes as a whole.
 const FILLS: [f32; 2] = [u16::MAX as f32, 0.1 * u16::MAX as f32];
@@ -156,16 +156,36 @@ impl Aspirator {
         self.loosen(fills);
     }
 
+    /// Cuts faces, `4 · tetrahedron + face`: a small piece that nothing joins any more goes.
+    pub fn cut(&mut self, faces: &[u32], fills: &[u16]) {
+        let cut = faces.iter().map(|face| [(face / 4) as usize, (face % 4) as usize]);
+        let beside = |pieces: &mut Pieces, [tet, face]: [usize; 2]| {
+            let next = std::mem::replace(&mut pieces.neighbours[tet][face], NONE);
+            let theirs = pieces.neighbours.get_mut(next as usize).into_iter().flatten();
+            theirs.filter(|back| **back == tet as u32).for_each(|back| *back = NONE);
+            next
+        };
+        for at in cut {
+            let next = beside(&mut self.pieces, at);
+            [at[0] as u32, next].into_iter().for_each(|from| self.loosen_from(from, fills));
+        }
+    }
+
     /// Finds the pieces that hang loose since the thinned tetrahedra went.
     fn loosen(&mut self, fills: &[u16]) {
         for at in 0..self.thinned.len() {
             let tet = self.thinned[at] as usize;
-            for from in self.pieces.neighbours[tet].into_iter().filter(|_| fills[tet] == 0) {
-                for &loose in self.pieces.loose(from, fills, &self.rates) {
-                    if !std::mem::replace(&mut self.leaves[loose as usize], true) {
-                        self.leaving.push(loose);
-                    }
-                }
+            if fills[tet] == 0 {
+                self.pieces.neighbours[tet].into_iter().for_each(|from| self.loosen_from(from, fills));
+            }
+        }
+    }
+
+    /// Lets the piece around a tetrahedron leave if it hangs loose.
+    fn loosen_from(&mut self, from: u32, fills: &[u16]) {
+        for &loose in self.pieces.loose(from, fills, &self.rates) {
+            if !std::mem::replace(&mut self.leaves[loose as usize], true) {
+                self.leaving.push(loose);
             }
         }
     }

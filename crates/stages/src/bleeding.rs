@@ -9,7 +9,7 @@ use crate::haptic_tick::SecondTool;
 use serde::Serialize;
 use trepan_bleeding::{Act, Perfusion, Wound};
 use trepan_geometry::{ToolKind, Vec3};
-use trepan_mesh::TetMesh;
+use trepan_mesh::{Split, TetMesh};
 
 /// Picolitres in a ml.
 const PL_PER_ML: f64 = 1e9;
@@ -51,11 +51,14 @@ pub(crate) struct Bleeder {
     pub wound: Wound,
     /// Against gravity, a unit vector.
     up: Vec3,
+    /// Splits of nodes that the wound follows.
+    followed: usize,
+    last_ms: f64,
 }
 
 impl Bleeder {
     pub fn of(mesh: &TetMesh, perfusion: &[Perfusion], up: Vec3) -> Self {
-        Self { wound: Wound::of(mesh, perfusion), up }
+        Self { wound: Wound::of(mesh, perfusion), up, followed: 0, last_ms: 0.0 }
     }
 
     /// Takes tetrahedra away, goes on to a time with the tools whose pedal is down, and keeps
@@ -68,6 +71,7 @@ impl Bleeder {
         gone: impl Iterator<Item = u32>,
         now: &mut Bleeding,
     ) {
+        self.last_ms = now_ms;
         gone.for_each(|tet| self.wound.remove(tet, positions, now_ms));
         let acts = used.into_iter().flatten().filter_map(|SecondTool { tool, state, .. }| {
             let act = match tool.kind {
@@ -79,6 +83,15 @@ impl Bleeder {
         });
         self.wound.step(now_ms, positions, self.up, acts);
         self.tell(self.wound.rate_ml_per_min(now_ms), now);
+    }
+
+    /// Follows all splits of nodes so far. Where nodes have `positions`, mm, what comes to light
+    /// bleeds.
+    pub fn split(&mut self, splits: &[Split], positions: Option<&[Vec3]>, now: &mut Bleeding) {
+        let new = splits.get(self.followed..).unwrap_or_default();
+        self.followed = self.followed.max(splits.len());
+        self.wound.split(new, positions, self.last_ms);
+        now.stains.resize(self.wound.stains().len(), 0);
     }
 
     /// Tells how the wound is, with its rate, ml/min.

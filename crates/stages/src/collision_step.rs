@@ -13,6 +13,7 @@ use crate::bleeding::{Bleeder, Bleeding};
 use crate::dura::{DuraState, Membrane};
 use crate::haptic_tick::{SecondTool, ToolSample};
 use crate::program::{Phase, Program};
+use crate::scissors::{MOST_SPLITS, Scissors};
 use crate::second_hand::SecondHand;
 use crate::settling::Settling;
 use crate::skull_wall::SkullWall;
@@ -24,16 +25,18 @@ use trepan_deformable::{Config, ConfigError, MeshCollision, NodeContact, TissueC
 use trepan_dura::Dura;
 use trepan_geometry::{Buttons, Tool, ToolKind, Vec3};
 use trepan_link::wire::CollisionRecord;
-use trepan_mesh::TetMesh;
+use trepan_mesh::{Split, TetMesh};
 use trepan_soft::Loads;
 
 impl CollisionStage {
     /// Runs a step; its results are in [`patches`](Self::patches) and [`loads`](Self::loads).
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
+        self.follow_cuts(soft);
         let first = SecondTool { tool: sample.tool, slot: sample.slot, state: sample.state };
         self.touch(0, Some(first), soft);
         self.touch(1, sample.second, soft);
         let is_open = self.meet_dura(sample, soft);
+        self.cut(sample, soft);
         self.aspirate(sample, soft);
         let is_touched = sample.phase() == Phase::Brain || self.steps[1].points_in_contact > 0;
         let phase = if is_open && is_touched { Phase::Brain } else { Phase::Craniotomy };
@@ -67,6 +70,33 @@ impl CollisionStage {
             dura.step(sample, &soft.positions, &mut self.patches, &mut self.wound.dura);
             dura.is_open()
         })
+    }
+
+    /// Takes over the splits that the solver has made.
+    fn follow_cuts(&mut self, soft: &SoftFrame) {
+        let new = soft.splits.get(self.followed..).unwrap_or_default();
+        if new.is_empty() {
+            return;
+        }
+        self.tools.iter_mut().for_each(|tool| tool.split(new));
+        self.followed = soft.splits.len();
+        if let Some(bleeder) = &mut self.bleeder {
+            bleeder.split(&soft.splits, Some(&soft.positions), &mut self.wound.bleeding);
+        }
+    }
+
+    /// Cuts what scissors close on.
+    fn cut(&mut self, sample: &ToolSample, soft: &SoftFrame) {
+        let Some((scissors, aspirator)) = self.scissors.as_mut().zip(self.aspirator.as_mut()) else { return };
+        let is_covered = self.dura.as_ref().is_some_and(Membrane::covers);
+        let may = |tool: &SecondTool| tool.tool.kind == ToolKind::Scissors && !is_covered;
+        let held = sample.tools().map(|tool| tool.filter(may));
+        let Loads { fills, splits, .. } = &mut self.loads;
+        let first = scissors.step(held, &soft.positions, fills, splits);
+        if first < scissors.cuts.len() {
+            aspirator.cut(&scissors.cuts[first..], fills);
+            self.wound.cut_mm2 = scissors.cut_mm2;
+        }
     }
 
     /// Takes tissue away that an aspirator touches; contact feels that from the next step on.
@@ -113,6 +143,8 @@ pub struct Wound {
     pub bleeding: Bleeding,
     /// The dura over it.
     pub dura: DuraState,
+    /// Area that scissors have cut, mm².
+    pub cut_mm2: f64,
 }
 
 impl Wound {
@@ -120,6 +152,7 @@ impl Wound {
     pub fn copy_from(&mut self, other: &Self) {
         self.bleeding.copy_from(&other.bleeding);
         self.dura.copy_from(&other.dura);
+        self.cut_mm2 = other.cut_mm2;
     }
 }
 
@@ -136,6 +169,8 @@ pub struct SoftFrame {
     pub velocities: Vec<Vec3>,
     /// What is left of each tetrahedron, of 65535; empty where nothing was resected.
     pub fills: Vec<u16>,
+    /// Splits of nodes so far; the copies come after the mesh's nodes.
+    pub splits: Vec<Split>,
 }
 
 /// Contact of the brain's surface with itself: springs between a border node and the triangle that
@@ -170,6 +205,9 @@ pub struct CollisionStage {
     under_pressure: bool,
     settling: Settling,
     aspirator: Option<Aspirator>,
+    scissors: Option<Scissors>,
+    /// Splits that contact follows.
+    followed: usize,
     bleeder: Option<Bleeder>,
     dura: Option<Membrane>,
     wound: Wound,
@@ -211,6 +249,8 @@ impl CollisionStage {
             patches: Default::default(),
             settling: Settling::default(),
             aspirator: None,
+            scissors: None,
+            followed: 0,
             bleeder: None,
             dura: None,
             wound: Wound::default(),
@@ -266,6 +306,13 @@ impl CollisionStage {
         Ok(Self { tools, loads, aspirator: Some(Aspirator::of(mesh, rates)), ..self })
     }
 
+    /// Lets scissors cut what an aspirator may take. Comes after [`aspirating`](Self::aspirating);
+    /// the solver must have [`split`](trepan_soft::SoftSolver::split).
+    pub fn cutting(mut self, mesh: &TetMesh, rates: &[f32]) -> Self {
+        self.loads.splits.reserve(MOST_SPLITS);
+        Self { scissors: Some(Scissors::of(mesh, rates)), ..self }
+    }
+
     /// Lets what is aspirated bleed, by the perfusion of each tetrahedron; `up` is the unit vector
     /// against gravity. Without an aspirator nothing bleeds.
     pub fn bleeding(self, mesh: &TetMesh, perfusion: &[Perfusion], up: Vec3) -> Self {
@@ -301,8 +348,10 @@ impl CollisionStage {
         to.extend([self.aspirated_mm3().to_bits(), self.loads.fills.len() as u64]);
         to.extend(self.loads.fills.iter().map(|fill| u64::from(*fill)));
         self.dura.iter().for_each(|membrane| membrane.dura.save(to));
+        self.scissors.iter().for_each(|scissors| scissors.save(&self.loads.splits, to));
         if let Some(Bleeder { wound, .. }) = &self.bleeder {
             let now = &self.wound.bleeding;
+            to.push(self.followed as u64);
             to.extend([now.rate_ml_per_min, now.worst_ml_per_min].map(|rate| u64::from(rate.to_bits())));
             wound.save(to);
         }
@@ -312,7 +361,8 @@ impl CollisionStage {
     /// An empty list with room for all that [`save`](Self::save) may append.
     pub fn room_to_save(&self) -> Vec<u64> {
         let dura = self.dura.as_ref().map_or(0, |membrane| membrane.dura.most_words());
-        Vec::with_capacity(16 + 41 * self.loads.fills.len() + self.wound.bleeding.stains.len() + dura)
+        let cuts = self.scissors.as_ref().map_or(0, |_| Scissors::most_words() + MOST_SPLITS);
+        Vec::with_capacity(16 + 41 * self.loads.fills.len() + self.wound.bleeding.stains.len() + dura + cuts)
     }
 
     /// Takes over, before the first step, what a stage of the same brain saved; times are
@@ -324,7 +374,10 @@ impl CollisionStage {
         (fills.len() == tets).then_some(())?;
         let mut dura = self.dura.as_ref().map(|membrane| membrane.dura.clone());
         dura.as_mut().map_or(Some(()), |dura| dura.restore(words, later_ms))?;
+        let splits = self.scissors.as_mut().map_or(Some(Vec::new()), |scissors| scissors.restore(words))?;
         if let Some(bleeder) = &mut self.bleeder {
+            let followed = splits.get(..words.next()? as usize)?;
+            bleeder.split(followed, None, &mut self.wound.bleeding);
             let rates = [f32::from_bits(words.next()? as u32), f32::from_bits(words.next()? as u32)];
             let gone = (0u32..).zip(&fills).filter(|(_, fill)| **fill == 0).map(|(tet, _)| tet);
             bleeder.wound.restore(words, gone, later_ms)?;
@@ -335,7 +388,10 @@ impl CollisionStage {
             membrane.dura = dura;
             membrane.tell(&mut self.wound.dura);
         }
+        self.loads.splits = splits;
+        self.wound.cut_mm2 = self.scissors.as_ref().map_or(0.0, |scissors| scissors.cut_mm2);
         if let Some(aspirator) = &mut self.aspirator {
+            self.scissors.iter().for_each(|scissors| aspirator.cut(&scissors.cuts, &fills));
             aspirator.restore(&fills, taken_mm3);
             for tool in &mut self.tools {
                 aspirator.thinned.iter().for_each(|&tet| tool.thin(tet, fills[tet as usize]));

@@ -14,8 +14,9 @@
 //!
 //! # Practice
 //! A step never panics, allocates, locks, logs or waits; faults of device, thread or input are
-//! answers, and each is counted. One step of a session is the exception: that in which a cheaper
-//! solver takes over allocates, and logs where its body was refused. Only a
+//! answers, and each is counted. The exceptions are the solver's and the collision's steps in which
+//! another solver takes over, a cheaper one or one of a brain that was cut: these allocate, and log
+//! where its body was refused. Only a
 //! [`GuardedWrench`](trepan_contact::GuardedWrench) leaves a tick.
 //!
 //! # When not to use it
@@ -36,6 +37,7 @@ pub mod haptic_tick;
 mod motion;
 pub mod notice;
 pub mod program;
+pub mod scissors;
 pub mod score;
 pub mod second_hand;
 pub mod settling;

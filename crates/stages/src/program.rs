@@ -107,9 +107,9 @@ impl Phase {
 /// How many of the tray's tools cut bone; they come first.
 const BONE_TOOLS: usize = 4;
 /// The tool for the dura, which only a skull has.
-const DURA_TOOL: usize = 8;
+const DURA_TOOL: usize = 9;
 /// Every tool.
-const TRAY: [Tool; 9] = [
+const TRAY: [Tool; 10] = [
     Tool::burr(3.0),
     Tool::burr(2.0),
     Tool::perforator(),
@@ -118,6 +118,7 @@ const TRAY: [Tool; 9] = [
     Tool::spatula(),
     Tool::aspirator(),
     Tool::bipolar(),
+    Tool::scissors(),
     Tool::scalpel(),
 ];
 

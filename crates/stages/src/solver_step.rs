@@ -7,16 +7,16 @@
 //! too much at 40 mm/s. A record is made when a new contact takes effect,
 //! and every [`EACH`] steps: as much as a replay needs. Where the processor is too slow, a cheaper
 //! solver of the same body goes on from the same state; the record of its first step says so, and
-//! a replay changes at the same step.
+//! a replay changes at the same step. So it is where the brain was cut: a solver of the split body
+//! is made beside, and goes on when it is there.
 
 use crate::collision_step::SoftFrame;
 use serde::Serialize;
-use std::sync::mpsc::{Sender, channel};
-use std::thread::JoinHandle;
-use std::time::Duration;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;
+use trepan_mesh::Split;
 use trepan_soft::{Loads, MakeSolver, SoftSolver, StepReport};
 
 /// Steps between two records while the contact is unchanged.
@@ -39,10 +39,13 @@ impl SolverStage {
                 self.loads.fills.clone_from(&loads.fills);
                 self.solver.lower_fills(&loads.fills);
             }
+            if self.loads.splits.len() != loads.splits.len() {
+                self.loads.splits.clone_from(&loads.splits);
+            }
             (self.contact_seq, self.followed_ms) = (contact_seq, 0.0);
             self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
         }
-        let changed = self.takes_cheaper();
+        let changed = self.takes_next();
         let dt_ms = self.dt_ms();
         let report = self.solver.step(&self.loads, dt_ms);
         self.steps += 1;
@@ -79,39 +82,79 @@ impl SolverStage {
             inverted,
             compute_us: 0.0,
             cheaper: self.solver_faults.cheaper_from_ms.is_some().into(),
+            splits: self.splits as u32,
         }
     }
 
     /// Has a cheaper solver made, once; it steps from when it is there.
     pub fn ask_for_cheaper(&mut self) {
-        let Some(make) = self.maker.as_ref().and_then(|_| self.solver.cheaper()) else { return };
-        if let Some(Maker { ask, thread }) = self.maker.take() {
-            // The thread waits for it.
-            ask.send(make).ok();
-            self.coming = Some(thread);
+        let is_wanted = self.may_be_cheaper && self.coming.is_none();
+        let Some(make) = is_wanted.then(|| self.solver.cheaper()).flatten() else { return };
+        self.may_be_cheaper = false;
+        self.ask(make, Coming::Cheaper);
+    }
+
+    /// Has a solver of the body as it was cut by now made; it steps from when it is there.
+    pub fn ask_for_splits(&mut self) {
+        self.ask_for(self.loads.splits.len());
+    }
+
+    fn ask_for(&mut self, splits: usize) {
+        let Some(new) = self.loads.splits.get(self.splits..splits).filter(|new| !new.is_empty()) else { return };
+        let is_wanted = self.coming.is_none() && self.refused < splits;
+        if let Some(make) = is_wanted.then(|| self.solver.split(new)).flatten() {
+            self.ask(make, Coming::Split(splits));
         }
     }
 
-    /// The same, and waits until it is there: for a replay.
+    fn ask(&mut self, make: MakeSolver, coming: Coming) {
+        let asked = self.maker.as_ref().is_some_and(|maker| maker.jobs.send(Job::Make(make)).is_ok());
+        self.coming = asked.then_some(coming);
+    }
+
+    /// The same as [`ask_for_cheaper`](Self::ask_for_cheaper), and the step waits for it: for a
+    /// replay.
     pub fn wait_for_cheaper(&mut self) {
         self.ask_for_cheaper();
-        while self.coming.as_ref().is_some_and(|coming| !coming.is_finished()) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        self.waits = true;
     }
 
-    /// Lets the cheaper solver go on once it is made; returns whether it does from this step on.
-    /// This step alone allocates, and ends the former solver's threads.
-    fn takes_cheaper(&mut self) -> bool {
-        let Some(coming) = self.coming.take_if(|coming| coming.is_finished()) else { return false };
-        let Ok(Some(mut solver)) = coming.join() else {
-            tracing::warn!("the brain's solver cannot take longer steps: its body was refused");
+    /// The same as [`ask_for_splits`](Self::ask_for_splits) for so many of those in the loads.
+    pub fn wait_for_splits(&mut self, loads: &Loads, splits: usize) {
+        self.loads.splits.clone_from(&loads.splits);
+        self.ask_for(splits);
+        self.waits = true;
+    }
+
+    /// Lets the solver that was asked for go on once it is made; returns whether it does from this
+    /// step on. This step alone allocates.
+    fn takes_next(&mut self) -> bool {
+        let waits = std::mem::take(&mut self.waits);
+        let Some((coming, maker)) = self.coming.zip(self.maker.as_ref()) else { return false };
+        let made = if waits { maker.made.recv().ok() } else { maker.made.try_recv().ok() };
+        let Some(made) = made else { return false };
+        self.coming = None;
+        let Some(mut solver) = made else {
+            tracing::warn!("the brain's solver goes on as it was: that of its changed body was refused");
+            self.refused = self.loads.splits.len();
             return false;
         };
-        solver.resume(self.solver.state(), &self.solver.memory());
+        let to = if let Coming::Split(to) = coming { to } else { self.splits };
+        let new = &self.loads.splits[self.splits..to];
+        solver.resume(&*self.solver, new);
         solver.lower_fills(&self.loads.fills);
-        self.solver = solver;
-        self.solver_faults.cheaper_from_ms = Some(self.time_ms);
+        for Split { from, node, .. } in new {
+            if *node as usize == self.rest.len() {
+                self.rest.push(self.rest[*from as usize]);
+            }
+        }
+        self.splits = to;
+        if let Coming::Cheaper = coming {
+            self.solver_faults.cheaper_from_ms = Some(self.time_ms);
+        }
+        let former = std::mem::replace(&mut self.solver, solver);
+        // Where the maker is gone, it ends here.
+        maker.jobs.send(Job::End(former)).ok();
         true
     }
 }
@@ -131,25 +174,55 @@ pub struct SolverStage {
     max_displacement_mm: f32,
     /// Simulated time of the last touch of the brain, ms.
     touched_ms: f64,
-    /// Who can make a cheaper solver, until asked, and then where it is made.
+    /// Splits that the solver has, and those up to which they were refused.
+    splits: usize,
+    refused: usize,
     maker: Option<Maker>,
-    coming: Option<JoinHandle<Option<Box<dyn SoftSolver>>>>,
+    coming: Option<Coming>,
+    /// Whether the next step waits for what is coming.
+    waits: bool,
+    /// Whether no cheaper solver was asked for yet.
+    may_be_cheaper: bool,
 }
 
-/// A thread that waits to make a solver. It begins with the stage, not when it is asked: then it
-/// would inherit the real-time priority of the solver's loop, and its solver's threads with it.
+/// A solver that is being made.
+#[derive(Clone, Copy)]
+enum Coming {
+    Cheaper,
+    /// With so many splits.
+    Split(usize),
+}
+
+/// What the maker's thread is to do.
+enum Job {
+    Make(MakeSolver),
+    End(Box<dyn SoftSolver>),
+}
+
+/// A thread that makes solvers and ends former ones. It begins with the stage, not when it is
+/// asked: then it would inherit the real-time priority of the solver's loop, and its solver's
+/// threads with it.
 struct Maker {
-    ask: Sender<MakeSolver>,
-    thread: JoinHandle<Option<Box<dyn SoftSolver>>>,
+    jobs: Sender<Job>,
+    made: Receiver<Option<Box<dyn SoftSolver>>>,
 }
 
 impl Maker {
     /// Starts the thread; it ends when this is dropped.
     fn start() -> Option<Self> {
-        let (ask, asked) = channel::<MakeSolver>();
-        let make = move || asked.recv().ok().and_then(|make| make());
-        let thread = std::thread::Builder::new().name("cheaper".into()).spawn(make).ok()?;
-        Some(Self { ask, thread })
+        let (jobs, todo) = channel();
+        let (ready, made) = channel();
+        let work = move || {
+            for job in todo {
+                match job {
+                    // Nobody waits for it any more.
+                    Job::Make(make) => _ = ready.send(make()),
+                    Job::End(solver) => drop(solver),
+                }
+            }
+        };
+        std::thread::Builder::new().name("solver maker".into()).spawn(work).ok()?;
+        Some(Self { jobs, made })
     }
 }
 
@@ -245,8 +318,12 @@ impl SolverStage {
             solver_faults: SolverFaults::default(),
             max_displacement_mm: 0.0,
             touched_ms: f64::NEG_INFINITY,
+            splits: 0,
+            refused: 0,
             maker: Maker::start(),
             coming: None,
+            waits: false,
+            may_be_cheaper: true,
         }
     }
 
@@ -264,6 +341,10 @@ impl SolverStage {
         frame.velocities.clear();
         frame.velocities.extend_from_slice(self.solver.velocities());
         frame.fills.clone_from(&self.loads.fills);
+        if frame.splits.len() != self.splits {
+            frame.splits.clear();
+            frame.splits.extend_from_slice(&self.loads.splits[..self.splits]);
+        }
     }
 
     /// Makes room for what an aspirator leaves of a number of tetrahedra.
@@ -275,6 +356,11 @@ impl SolverStage {
     /// What is left of each tetrahedron, of 65535; empty where nothing can be resected.
     pub fn fills(&self) -> &[u16] {
         &self.loads.fills
+    }
+
+    /// Splits of nodes that the solver has.
+    pub fn splits(&self) -> &[Split] {
+        &self.loads.splits[..self.splits]
     }
 
     /// Returns the largest displacement of a node from its rest position, mm.

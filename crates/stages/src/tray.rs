@@ -117,8 +117,9 @@ mod tests {
         assert_eq!(ask(Buttons::take(ToolKind::Spatula), true, true), (Some(Change::Taken), 5));
         assert_eq!(ask(Buttons::take(ToolKind::Aspirator), true, true), (Some(Change::Taken), 6));
         ask(NONE, true, true);
-        for tool in [7, 8] {
-            assert_eq!(ask(Buttons::NEXT_TOOL, true, true), (Some(Change::Taken), tool), "the bipolar, the scalpel");
+        for tool in [7, 8, 9] {
+            let taken = ask(Buttons::NEXT_TOOL, true, true);
+            assert_eq!(taken, (Some(Change::Taken), tool), "the bipolar, the scissors, the scalpel");
             ask(NONE, true, true);
         }
         assert_eq!(ask(Buttons::NEXT_TOOL, true, false), (Some(Change::Taken), 0), "back to the bone");

@@ -6,6 +6,7 @@ use crate::config::{Config, Damping};
 use crate::elements::Elements;
 use crate::nodes::{Nodes, Update, kick_ms};
 use crate::part::CALM;
+use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_mesh::Split;
 use trepan_soft::simd::Layout;
@@ -19,7 +20,7 @@ pub struct Tled {
     pub(crate) base: Base,
     pub(crate) elements: Elements,
     /// The body at rest.
-    pub(crate) body: Body,
+    pub(crate) body: Arc<Body>,
     pub(crate) springs: ImplicitSprings,
     /// Surface pressure, its triangles given by place.
     pub(crate) pressure: SurfacePressure,
@@ -67,7 +68,7 @@ impl SoftSolver for Tled {
         if self.base.config.mass_scaling >= CHEAPER_MASS_SCALING {
             return None;
         }
-        let (body, pressure, fills) = (self.body.clone(), self.pressure.clone(), self.fills().to_vec());
+        let (body, pressure, fills) = (Arc::clone(&self.body), self.pressure.clone(), self.fills().to_vec());
         Some(Box::new(move || {
             let mut solver = Self { pressure, ..Self::new(&body, &config).ok()? };
             solver.elements.empty_to(&fills, &body, &solver.base.layout);
@@ -79,11 +80,12 @@ impl SoftSolver for Tled {
     fn split(&self, splits: &[Split]) -> Option<MakeSolver> {
         let damping = Damping::Rate(self.base.damping_per_ms);
         let config = Config { damping, ..self.base.config };
-        let (mut body, fills, splits) = (self.body.clone(), self.fills().to_vec(), splits.to_vec());
+        let (body, fills, splits) = (Arc::clone(&self.body), self.fills().to_vec(), splits.to_vec());
         let Layout { node_at, tet_at, .. } = &self.base.layout;
         let (tet_at, mut pressure) = (tet_at.clone(), self.pressure.clone());
         pressure.triangles.iter_mut().flatten().for_each(|place| *place = node_at[*place as usize]);
         Some(Box::new(move || {
+            let mut body = Body::clone(&body);
             body.split(&splits)?;
             let mut solver = Self::in_order(&body, &config, Some(tet_at)).ok()?;
             solver.set_pressure(pressure);
@@ -96,13 +98,20 @@ impl SoftSolver for Tled {
         self.elements.memory()
     }
 
+    fn fills(&self) -> &[u16] {
+        &self.elements.fills.now
+    }
+
     /// A stress memory of another length starts anew.
-    fn resume(&mut self, state: &NodeState, memory: &[f32]) {
+    fn resume(&mut self, from: &dyn SoftSolver, splits: &[Split]) {
+        let mut state = from.state().clone();
+        state.split(splits);
+        self.elements.empty_to(from.fills(), &self.body, &self.base.layout);
         let nodes = self.elements.nodes();
         for (node, &place) in self.base.layout.place_of.iter().enumerate() {
             nodes.set(place as usize, state.positions[node] - self.base.rest[node], state.velocities[node]);
         }
-        self.elements.remember(memory);
+        self.elements.remember(&from.memory());
         self.elements.wake();
         self.publish();
     }
@@ -202,7 +211,7 @@ impl Tled {
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             mass_added: scaling.added as f32,
-            body: body.clone(),
+            body: Arc::new(body.clone()),
             base,
         })
     }
@@ -214,11 +223,6 @@ impl Tled {
     /// nothing. Costs 3 us in each of these steps, and no memory.
     pub fn lower_fill(&mut self, tet: u32, fill: u16) {
         self.elements.fills.lower(tet, fill);
-    }
-
-    /// Present fill of every tetrahedron, in parts of [`FULL`](crate::FULL).
-    pub fn fills(&self) -> &[u16] {
-        &self.elements.fills.now
     }
 
     /// Stable (critical) time step of the elements without safety factor and averaged

@@ -186,7 +186,7 @@ fn a_cheaper_solver_has_the_same_hole() {
     let (_, nodes) = without(&body, &hole(&body));
     let tled = emptied(&body, &Config::default(), &hole(&body));
     let mut cheaper = tled.cheaper().unwrap()().unwrap();
-    cheaper.resume(tled.state(), &tled.memory());
+    cheaper.resume(&tled, &[]);
     let loads = Loads { gravity: GRAVITY, ..Loads::default() };
     (0..20).for_each(|_| _ = cheaper.step(&loads, 0.1));
     let is_still = |n: &u32| cheaper.velocities()[*n as usize] == Vec3::ZERO;

@@ -2,7 +2,7 @@
 
 use trepan_geometry::Vec3;
 use trepan_mesh::{NONE, Split, Splitter, TetMesh};
-use trepan_soft::{Body, Loads, Material, NodeState, SoftSolver, boxes};
+use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Relaxation, Tled};
 
 /// Splits along the faces between two sides, of those that `cuts` takes by their tetrahedron's
@@ -33,9 +33,7 @@ fn config() -> Config {
 /// The solver of the same body after a cut, with its state.
 fn cut(solver: &Tled, splits: &[Split]) -> Box<dyn SoftSolver> {
     let mut next = solver.split(splits).expect("it can be split")().expect("the body is sound");
-    let mut state: NodeState = solver.state().clone();
-    state.split(splits);
-    next.resume(&state, &solver.memory());
+    next.resume(solver, splits);
     next
 }
 

@@ -159,6 +159,8 @@ fn pedal(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
         (Some(ToolKind::Bipolar), true) => "Coagulating (Space)",
         (Some(ToolKind::Scalpel), false) => "Hold to incise (Space)",
         (Some(ToolKind::Scalpel), true) => "Incising (Space)",
+        (Some(ToolKind::Scissors), false) => "Press to cut (Space)",
+        (Some(ToolKind::Scissors), true) => "Closed (Space)",
         (Some(_), false) => "Hold to aspirate (Space)",
         (Some(_), true) => "Aspirating (Space)",
     };

@@ -22,7 +22,7 @@ fn german() -> Language {
 fn panels() -> [Panel; 9] {
     let soft = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator(), Tool::bipolar()];
     let tools = [Tool::burr(3.0), Tool::perforator(), Tool::craniotome()].into_iter().chain(soft).collect();
-    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula", "aspirator", "bipolar", "scalpel"];
+    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula", "aspirator", "bipolar", "scalpel", "scissors"];
     let options = names.map(|name| (name.to_string(), None)).into();
     let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
     let by_hand = Panel { by_hand: true, rate_hz: 1000.0, choices: vec![choice], ..Panel::default() };
@@ -31,10 +31,10 @@ fn panels() -> [Panel; 9] {
     let timeline = Timeline { at_s: 2.0, length_s: 9.0, ready_s: 5.0, running: true, speed: 1.0, marks };
     let script = Panel { by_hand: false, ..by_hand.clone() };
     let on_tissue = |kind| [false, true].map(|drilling| Panel { on_tissue: Some(kind), drilling, ..by_hand.clone() });
-    let [[rests, runs], [cold, hot], [blunt, sharp]] =
-        [ToolKind::Aspirator, ToolKind::Bipolar, ToolKind::Scalpel].map(on_tissue);
+    let [[rests, runs], [cold, hot], [blunt, sharp], [open, closed]] =
+        [ToolKind::Aspirator, ToolKind::Bipolar, ToolKind::Scalpel, ToolKind::Scissors].map(on_tissue);
     let replay = Panel { timeline: Some(timeline), ..script.clone() };
-    [Panel { drilling: true, ..by_hand }, rests, runs, cold, hot, blunt, sharp, script, replay]
+    [Panel { drilling: true, ..by_hand }, rests, runs, cold, hot, blunt, sharp, open, closed, script, replay]
 }
 
 #[test]

@@ -43,6 +43,15 @@ fn silhouette(painter: &egui::Painter, area: egui::Rect, tool: &Tool, ink: Color
         }
         return;
     }
+    if tool.kind == ToolKind::Scissors {
+        for side in [-1.0, 1.0] {
+            let (pivot, ring) = (tip + egui::vec2(13.0, 0.0), end + egui::vec2(-2.0, -5.0 * side));
+            painter.line_segment([tip + egui::vec2(0.0, 3.0 * side), pivot], Stroke::new(2.0, ink));
+            painter.line_segment([pivot, ring], Stroke::new(1.5, ink));
+            painter.circle_stroke(ring, 2.5, Stroke::new(1.5, ink));
+        }
+        return;
+    }
     if tool.kind == ToolKind::Scalpel {
         let blade = vec![tip, tip + egui::vec2(14.0, -4.0), tip + egui::vec2(14.0, 1.0)];
         painter.add(egui::Shape::convex_polygon(blade, ink, Stroke::NONE));
@@ -68,5 +77,6 @@ fn use_of(kind: ToolKind) -> &'static str {
         ToolKind::Aspirator => "Takes brain tissue away while its pedal is down",
         ToolKind::Bipolar => "Coagulates bleeding tissue while its pedal is down, and rinses",
         ToolKind::Scalpel => "Incises the dura while its pedal is down",
+        ToolKind::Scissors => "Cut the brain each time that the pedal goes down",
     }
 }

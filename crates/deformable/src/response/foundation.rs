@@ -173,6 +173,11 @@ impl Foundation {
         }
     }
 
+    /// Makes room for so many nodes.
+    pub(crate) fn make_room(&mut self, nodes: usize) {
+        self.spring_of.resize(nodes, NONE);
+    }
+
     /// Forgets where tool and tissue held each other.
     pub(crate) fn reset(&mut self) {
         self.grips.iter_mut().for_each(Vec::clear);

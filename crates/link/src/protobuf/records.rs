@@ -29,7 +29,7 @@ messages! {
         1 tick, 2 time_ms, 3 device, 4 twist, 5 buttons, 6 proxy, 7 wrench, 8 depth_mm, 9 tissue_depth_mm, 10 flags
     }
     CollisionRecord = "Collision" { 1 seq, 2 tick, 3 solver_step, 4 depth_mm, 5 points, 6 compute_us }
-    SolverRecord = "Solver" { 1 step, 2 contact_seq, 3 time_ms, 4 max_displacement_mm, 5 inverted, 6 compute_us, 7 cheaper }
+    SolverRecord = "Solver" { 1 step, 2 contact_seq, 3 time_ms, 4 max_displacement_mm, 5 inverted, 6 compute_us, 7 cheaper, 8 splits }
     EventRecord = "Event" { 1 tick, 2 time_ms, 3 kind, 4 text }
     TeacherRecord = "Teacher" { 1 seq, 2 ghost, 3 marker, 4 flags }
     StateRecord = "State" { 1 tick, 2 time_ms, 3 words, 4 checksum }

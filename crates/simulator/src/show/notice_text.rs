@@ -34,7 +34,7 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let sample = &view.sample;
     let [_, late, held] = view.counts;
     let on_tissue = Some(sample.tool.kind)
-        .filter(|kind| matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel));
+        .filter(|kind| matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel | ToolKind::Scissors));
     let brain_mm = match view.brain_distance_mm {
         mm if mm.is_finite() => format!("{mm:.1} mm"),
         _ => "no brain here".into(),
@@ -138,6 +138,9 @@ pub(crate) fn hint(tool: &Tool, by_hand: bool) -> &'static str {
         }
         (Phase::Brain, true) if tool.kind == ToolKind::Scalpel => {
             "hold the left button and draw the scalpel over the dura; another tool holds the leaves back"
+        }
+        (Phase::Brain, true) if tool.kind == ToolKind::Scissors => {
+            "point at the brain and press the left button: the scissors go in by 2 mm and close; Space closes them too"
         }
         (Phase::Brain, true) => "point at the brain and hold the left button to press it; let go to draw back",
     }

@@ -57,7 +57,7 @@ impl SoftSolver for WithSpare {
             if self.card.fault().is_none() {
                 return report;
             }
-            self.spare.resume(self.card.state(), &[]);
+            self.spare.resume(&self.card, &[]);
             self.lost.store(true, Ordering::Relaxed);
         }
         self.spare.step(loads, dt_ms)

@@ -64,6 +64,8 @@ const TABLE_MM: [f32; 4] = [0.0, 6.0, 10.0, 16.0];
 const PRESS_MM: f32 = 6.0;
 /// The same of a scalpel, mm, numerical: through the dura and no further.
 const INCISE_MM: f32 = 1.2;
+/// Depth at which scissors close in a press, mm.
+const SNIP_MM: f32 = 2.0;
 /// Height of a ball's centre over the inner table where the feed ends without a brain, in radii.
 /// The hole is then wider than the second of [`WIDE`].
 const END: f32 = 0.5;
@@ -137,6 +139,8 @@ struct Press {
     through: Option<Below>,
     /// Height of the tip along the shaft at its first touch of the brain, mm.
     touched: Option<f32>,
+    /// Whether scissors are still to close, deeper.
+    goes_in: bool,
 }
 
 /// The pointer's way that the tool has not gone yet.
@@ -207,7 +211,7 @@ impl Default for Guide {
 impl Guide {
     /// Whether the left button runs the drill now.
     pub fn pedal(&self) -> bool {
-        self.drills && self.press.is_some_and(|press| press.landed && press.through.is_none())
+        self.drills && self.press.is_some_and(|press| press.landed && press.through.is_none() && !press.goes_in)
     }
 
     /// What to do once the press has opened the bone.
@@ -288,7 +292,8 @@ impl Guide {
             let trail = Trail::to(if inserted { tip } else { under() });
             let (at_first, through, touched) = (None, None, None);
             let (grip, still_s, landed) = (in_plane, REST_S, inserted);
-            return Some(Press { trail, tip, grip, still_s, landed, at_first, through, touched });
+            let goes_in = around.tool.kind == ToolKind::Scissors;
+            return Some(Press { trail, tip, grip, still_s, landed, at_first, through, touched, goes_in });
         };
         if pointer.left != Vec2::ZERO {
             let moved = in_plane.zip(press.grip).map_or(Vec3::ZERO, |(now, before)| now - before);
@@ -433,6 +438,7 @@ impl Press {
             self.touched = Some(here);
         }
         if let Some(touched) = self.touched {
+            self.goes_in &= here > touched - SNIP_MM;
             let deep_mm = if kind == ToolKind::Scalpel { INCISE_MM } else { PRESS_MM };
             return touched - if cuts { 0.0 } else { deep_mm };
         }
