@@ -15,7 +15,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use trepan_mesh::{Surface, TetMesh};
+use trepan_mesh::{NONE, Split, Surface, TetMesh};
 
 /// The tetrahedra and their boundary, current and at rest.
 #[derive(Clone, Debug)]
@@ -24,6 +24,8 @@ pub(crate) struct Border {
     whole: Arc<Whole>,
     /// Which of its tetrahedra are gone; empty where none is.
     gone: Vec<bool>,
+    /// Nodes that were split.
+    splits: Vec<Split>,
     /// Vertices of what is shown, in the tetrahedra.
     embeddings: Vec<Embedding>,
     /// Triangles over the vertices.
@@ -38,6 +40,7 @@ pub(crate) struct Border {
     faces: Vec<[u32; 3]>,
     /// Walls of a hole in a cortex; their vertices come after those of the cortex.
     walls: Walls,
+    first_wall: usize,
     /// All nodes at rest, world mm.
     pub rest: Vec<Vec3>,
     /// All current nodes, world mm.
@@ -61,6 +64,7 @@ pub(crate) struct Border {
 /// The whole brain.
 #[derive(Debug)]
 struct Whole {
+    nodes: usize,
     tets: Vec<[u32; 4]>,
     /// Faces of the boundary, and the same in order; empty without a cortex.
     faces: Vec<[u32; 3]>,
@@ -70,6 +74,13 @@ struct Whole {
     embeddings: Vec<Embedding>,
     triangles: Vec<[u32; 3]>,
     looks: Vec<Vec4>,
+}
+
+/// What is shown of a cortex.
+struct Shown {
+    embeddings: Vec<Embedding>,
+    looks: Vec<Vec4>,
+    triangles: Vec<[u32; 3]>,
 }
 
 /// Stain of the dura.
@@ -123,7 +134,7 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
 impl Whole {
     fn of(mesh: &TetMesh, cortex: Option<&Cortex>) -> Self {
         let surface = Surface::of(mesh);
-        let tets = mesh.tets.clone();
+        let (tets, nodes) = (mesh.tets.clone(), mesh.positions.len());
         if let Some(Cortex { surface: fine, depth_mm }) = cortex {
             let mut triangles = fine.triangles.clone();
             chunks::sort(&mut triangles, &fine.positions);
@@ -139,12 +150,60 @@ impl Whole {
             let embeddings = embeddings(mesh, &fine.positions);
             let mut is_rim = vec![false; mesh.positions.len()];
             surface.triangles.iter().flatten().for_each(|n| is_rim[*n as usize] = true);
-            return Self { tets, faces: surface.triangles, known, is_rim, embeddings, triangles, looks };
+            return Self { nodes, tets, faces: surface.triangles, known, is_rim, embeddings, triangles, looks };
         }
         let (embeddings, triangles) = on_nodes(&surface.triangles);
         let looks = vec![BARE; embeddings.len()];
         let (known, is_rim) = Default::default();
-        Self { tets, faces: Vec::new(), known, is_rim, embeddings, triangles, looks }
+        Self { nodes, tets, faces: Vec::new(), known, is_rim, embeddings, triangles, looks }
+    }
+}
+
+impl Whole {
+    /// The cortex in a mesh of which nodes were split, without the triangles of which all corners
+    /// are in tetrahedra that are gone. What straddles a cut goes with one side of it, what
+    /// straddles the edge of a hole stays: it covers the gap to the wall.
+    fn cortex(&self, mesh: &TetMesh, splits: &[Split], is_gone: impl Fn(u32) -> bool) -> Shown {
+        let mut made = Shown { embeddings: self.embeddings.clone(), looks: self.looks.clone(), triangles: Vec::new() };
+        let mut is_cut = vec![false; self.tets.len()];
+        splits
+            .iter()
+            .map(|split| split.place().0)
+            .filter(|tet| *tet < self.tets.len())
+            .for_each(|tet| is_cut[tet] = true);
+        let is_cut = |tet: u32| is_cut.get(tet as usize).is_some_and(|is_cut| *is_cut);
+        for embedding in made.embeddings.iter_mut().filter(|embedding| is_cut(embedding.tet)) {
+            let (before, now) = (self.tets[embedding.tet as usize], mesh.tets[embedding.tet as usize]);
+            let node = |n: u32| before.iter().position(|m| *m == n).map_or(n, |corner| now[corner]);
+            embedding.nodes = embedding.nodes.map(node);
+        }
+        for corners in &self.triangles {
+            let tets = corners.map(|n| self.embeddings[n as usize].tet);
+            let Some(side) = tets.into_iter().find(|tet| !is_gone(*tet)) else { continue };
+            let pairs = [[0, 1], [1, 2], [2, 0]].map(|pair| pair.map(|n| tets[n]));
+            let straddles =
+                tets.into_iter().any(is_cut) && pairs.into_iter().any(|pair| self.are_apart(pair, &mesh.tets));
+            let mut of_side = |n: u32| {
+                let embedding = self.embeddings[n as usize];
+                let place = embedding.place(&mesh.positions);
+                let wanted = straddles && embedding.tet != side && side != NONE;
+                let Some(own) = wanted.then(|| Embedding::within(side, mesh, place)).flatten() else { return n };
+                made.embeddings.push(own);
+                made.looks.push(self.looks[n as usize]);
+                made.embeddings.len() as u32 - 1
+            };
+            made.triangles.push(corners.map(&mut of_side));
+        }
+        made
+    }
+
+    /// Whether two tetrahedra share a node at first and not any more.
+    fn are_apart(&self, pair: [u32; 2], tets: &[[u32; 4]]) -> bool {
+        let [a, b] = pair.map(|tet| tet as usize);
+        let Some((of_a, of_b)) = self.tets.get(a).zip(self.tets.get(b)) else { return false };
+        let differs =
+            |(i, n): (usize, &u32)| of_b.iter().position(|m| m == n).is_some_and(|k| tets[a][i] != tets[b][k]);
+        a != b && of_a.iter().enumerate().any(differs)
     }
 }
 
@@ -166,6 +225,7 @@ impl Border {
         let (rest, now, tets) = (mesh.positions.clone(), mesh.positions.clone(), mesh.tets.clone());
         let mut made = Self {
             gone: Vec::new(),
+            splits: Vec::new(),
             embeddings: whole.embeddings.clone(),
             triangles: whole.triangles.clone(),
             chunks: Vec::new(),
@@ -173,6 +233,7 @@ impl Border {
             looks: whole.looks.clone(),
             faces: whole.faces.clone(),
             walls: Walls::default(),
+            first_wall: whole.embeddings.len(),
             whole,
             tets,
             rest,
@@ -192,7 +253,7 @@ impl Border {
     fn shown(&mut self) {
         self.at_rest = self.embeddings.iter().map(|embedding| embedding.place(&self.rest)).collect();
         self.places = self.embeddings.iter().map(|embedding| embedding.place(&self.now)).collect();
-        let cortex = self.whole.embeddings.len().min(self.places.len());
+        let cortex = self.first_wall.min(self.places.len());
         self.walls.smooth(&mut self.at_rest[cortex..]);
         self.walls.smooth(&mut self.places[cortex..]);
         self.normals = vec![Vec3::ZERO; self.embeddings.len()];
@@ -201,19 +262,29 @@ impl Border {
         self.chunks = Chunk::all(&self.triangles, &self.at_rest);
     }
 
-    /// Shows the mesh without the tetrahedra that are `gone`, or all of it; returns whether that
-    /// differs from before. Then it costs 5 ms for the built-in head (`validate render/cortex`).
-    pub fn leave_out(&mut self, gone: Option<&[bool]>) -> bool {
+    /// Shows the mesh without the tetrahedra that are `gone` and opened where nodes were split;
+    /// returns whether that differs from before. Then it costs 5 ms for the built-in head
+    /// (`validate render/cortex`).
+    pub fn leave_out(&mut self, gone: Option<&[bool]>, splits: &[Split]) -> bool {
         let gone = gone.filter(|gone| gone.contains(&true)).unwrap_or_default();
-        if gone == self.gone {
+        if gone == self.gone && splits == self.splits {
             return false;
         }
-        self.gone = gone.to_vec();
+        (self.gone, self.splits) = (gone.to_vec(), splits.to_vec());
         let whole = Arc::clone(&self.whole);
         let is_gone = |tet: u32| gone.get(tet as usize).is_some_and(|gone| *gone);
-        let left = (0u32..).zip(&whole.tets).filter(|(t, _)| !is_gone(*t)).map(|(_, tet)| *tet);
-        self.tets = left.collect();
-        let mesh = TetMesh { positions: std::mem::take(&mut self.rest), tets: std::mem::take(&mut self.tets) };
+        let mut mesh = TetMesh { positions: std::mem::take(&mut self.rest), tets: whole.tets.clone() };
+        mesh.positions.truncate(whole.nodes);
+        let opens = mesh.split(splits).is_some();
+        let mut node_of: Vec<u32> = (0..whole.nodes as u32).collect();
+        for split in splits.iter().filter(|_| opens) {
+            node_of.resize(node_of.len().max(split.node as usize + 1), node_of[split.from as usize]);
+        }
+        self.now.truncate(whole.nodes);
+        self.now.extend(node_of[whole.nodes..].iter().map(|n| mesh.positions[*n as usize]));
+        let mut cortex = whole.cortex(&mesh, splits, is_gone);
+        let left = (0u32..).zip(&mesh.tets).filter(|(t, _)| !is_gone(*t)).map(|(_, tet)| *tet);
+        mesh.tets = left.collect();
         let mut bared = Surface::of(&mesh).triangles;
         (self.rest, self.tets) = (mesh.positions, mesh.tets);
         if whole.faces.is_empty() {
@@ -221,17 +292,16 @@ impl Border {
             self.looks = vec![BARE; self.embeddings.len()];
         } else {
             self.faces.clone_from(&bared);
-            bared.retain(|face| !whole.known.contains(&sorted(*face)));
+            bared.retain(|face| !whole.known.contains(&sorted(face.map(|n| node_of[n as usize]))));
             let (walls, faces) = on_nodes(&bared);
-            self.walls = Walls::of(&faces, walls.len(), |n| whole.is_rim[walls[n].nodes[0] as usize]);
-            // What straddles the edge stays: it covers the gap to the wall.
-            let stays = |corners: &&[u32; 3]| corners.iter().any(|n| !is_gone(whole.embeddings[*n as usize].tet));
-            let first = whole.embeddings.len() as u32;
-            self.triangles = whole.triangles.iter().filter(stays).copied().collect();
-            self.triangles.extend(faces.into_iter().map(|corners| corners.map(|n| n + first)));
-            self.embeddings = [&whole.embeddings[..], &walls[..]].concat();
-            self.looks.clone_from(&whole.looks);
-            self.looks.resize(self.embeddings.len(), Vec4::ONE);
+            let is_rim = |n: usize| whole.is_rim[node_of[walls[n].nodes[0] as usize] as usize];
+            self.walls = Walls::of(&faces, walls.len(), is_rim);
+            self.first_wall = cortex.embeddings.len();
+            let first = self.first_wall as u32;
+            cortex.triangles.extend(faces.into_iter().map(|corners| corners.map(|n| n + first)));
+            cortex.embeddings.extend(walls);
+            cortex.looks.resize(cortex.embeddings.len(), Vec4::ONE);
+            (self.triangles, self.embeddings, self.looks) = (cortex.triangles, cortex.embeddings, cortex.looks);
         }
         self.shown();
         true
@@ -277,7 +347,7 @@ impl Border {
         self.now.copy_from_slice(positions);
         let now = &self.now;
         self.places.par_iter_mut().zip(&self.embeddings).for_each(|(place, embedding)| *place = embedding.place(now));
-        let cortex = self.whole.embeddings.len().min(self.places.len());
+        let cortex = self.first_wall.min(self.places.len());
         self.walls.smooth(&mut self.places[cortex..]);
         touch(&mut self.places[..self.embeddings.len()], &self.faces, &self.now, balls);
         smooth_normals(&self.places, &self.triangles, &mut self.normals);

@@ -32,6 +32,14 @@ impl Embedding {
         Self { nodes: [node; 4], weights: [1.0, 0.0, 0.0, 0.0], offset: Vec3::ZERO, tet: NONE }
     }
 
+    /// A place at rest in a tetrahedron, or beside it; `None` in a flat one.
+    pub fn within(tet: u32, mesh: &TetMesh, place: Vec3) -> Option<Self> {
+        let (inverse, corner) = inverse(mesh.corners(tet as usize));
+        let w = inverse * (place - corner);
+        let weights = [1.0 - w.x - w.y - w.z, w.x, w.y, w.z];
+        w.is_finite().then_some(Self { nodes: mesh.tets[tet as usize], weights, offset: Vec3::ZERO, tet })
+    }
+
     /// Its place, by the places of all nodes.
     pub fn place(&self, positions: &[Vec3]) -> Vec3 {
         let [a, b, c, d] = self.nodes.map(|n| positions[n as usize]);

@@ -5,7 +5,7 @@ use glam::{IVec3, Vec3, Vec4};
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Pose, Tool};
-use trepan_mesh::{TetMesh, TriMesh};
+use trepan_mesh::{Split, TetMesh, TriMesh};
 use trepan_volume::VoxelVolume;
 
 /// The scene data that stays constant during a session.
@@ -72,6 +72,9 @@ pub struct Frame<'a> {
     /// Whether each tetrahedron of the brain was resected; `None` for none of them. The walls of
     /// the hole are drawn with the MRI on them.
     pub brain_gone: Option<&'a [bool]>,
+    /// Splits of the brain's nodes where it was cut, in their order; then `brain_positions` has the
+    /// copies too.
+    pub brain_splits: &'a [Split],
     /// Stain of each node of the brain: blood of 0 to 2 mm as 0 to 200, 255 for a burn; `None` for
     /// none.
     pub brain_stains: Option<&'a [u8]>,
@@ -178,6 +181,7 @@ impl Frame<'_> {
             drilling: false,
             brain_positions: None,
             brain_gone: None,
+            brain_splits: &[],
             brain_stains: None,
             dura: None,
             show_bone: true,

@@ -234,6 +234,7 @@ fn scores(summary: &Summary) -> String {
     if let Some(Resection { tumour_share, healthy_mm3, .. }) = summary.resection {
         _ = writeln!(csv, "resection.tumour_share,{tumour_share}\nresection.healthy_mm3,{healthy_mm3}");
     }
+    _ = writeln!(csv, "brain_cut_mm2,{}", summary.brain_cut_mm2);
     for of in &summary.tool_use.tools {
         let name = of.name.replace(", ", "_").replace(' ', "_");
         for (key, value) in serde_json::to_value(of).ok().as_ref().and_then(|of| of.as_object()).into_iter().flatten() {

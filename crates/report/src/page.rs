@@ -196,8 +196,8 @@ fn charts(outcome: &Outcome, recording: &Recording) -> Result<[Chart; 6], Report
 const TIMINGS: &str = "asked_hz rate_hz late_ticks held_ticks tick_us solver.dt_ms solver.step_us solver.collision_us \
                        solver.real_time_factor frames fps moving";
 /// Paths of the scores in a summary.
-const SCORES: &str = "scores bone_removed_mm3 resection bleeding dura tool_use plan cut_off hand_force_n \
-                      hand_force_scale";
+const SCORES: &str = "scores bone_removed_mm3 resection brain_cut_mm2 bleeding dura tool_use plan cut_off \
+                      hand_force_n hand_force_scale";
 
 /// A table of a page.
 #[derive(Serialize)]

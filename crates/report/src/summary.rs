@@ -72,6 +72,8 @@ pub struct Summary {
     pub bone_removed_mm3: f64,
     /// What an aspirator took; `null` if nothing.
     pub resection: Option<Resection>,
+    /// Area of brain that scissors cut, mm².
+    pub brain_cut_mm2: f64,
     /// How the wound bled; `null` if it did not.
     pub bleeding: Option<Bleeding>,
     /// What was done to the dura; `null` where it is not to be incised.
@@ -330,6 +332,7 @@ impl Summary {
             },
             hand_force_scale: outcome.force_scale,
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
+            brain_cut_mm2: wound.map_or(0.0, |wound| wound.cut_mm2),
             bleeding: wound.map(|wound| wound.bleeding.clone()).filter(|b| b.bled_ml > 0.0),
             dura: wound.map(|wound| wound.dura.clone()).filter(|dura| !dura.places.is_empty()),
             cut_off: self.cut_off.with_lifted(&outcome.written.notices),

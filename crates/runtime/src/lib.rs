@@ -38,6 +38,7 @@ use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::wire::TickRecord;
 use trepan_link::{Recorder, SceneWriter};
+use trepan_mesh::Split;
 use trepan_soft::Loads;
 use trepan_stages::collision_step::{CollisionStage, SoftFrame, Wound};
 use trepan_stages::flap::FlapPlace;
@@ -403,6 +404,9 @@ pub struct SolverOutcome {
     /// What is left of each tetrahedron, of 65535; empty where nothing could be resected.
     #[serde(skip)]
     pub fills: Vec<u16>,
+    /// Splits of nodes by cuts.
+    #[serde(skip)]
+    pub splits: Vec<Split>,
     /// The wound at the end.
     #[serde(skip)]
     pub wound: Wound,
@@ -417,6 +421,7 @@ impl SolverOutcome {
             end_displacement_mm: stage.displacement_mm(),
             solver_faults: *stage.solver_faults(),
             fills: stage.fills().to_vec(),
+            splits: stage.splits().to_vec(),
             ..Self::default()
         }
     }

@@ -96,6 +96,7 @@ fn script_s(name: &str, plan: &Plan) -> f64 {
                     f64::from(target.radius_mm).powi(2) * (0.43 * f64::from(target.radius_mm) + 2.0)
                 })
         }
+        ("cut", _) => 60.0,
         _ => 20.0,
     }
 }

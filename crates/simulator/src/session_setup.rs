@@ -263,6 +263,7 @@ impl SessionSetup {
             return Ok(Tissue { collision, solver });
         }
         let collision = collision.aspirating(&brain.mesh, &rates).map_err(|fault| brain_error(&fault))?;
+        let collision = collision.cutting(&brain.mesh, &rates);
         let collision = match self.operation.bleeding > 0.0 {
             true => collision.bleeding(&brain.mesh, &perfusion(brain, self.operation.bleeding), -self.plan.site.inward),
             false => collision,

@@ -30,6 +30,11 @@ pub const MOST_CUTS: usize = 4096;
 /// Most splits of nodes.
 pub const MOST_SPLITS: usize = 16_384;
 
+/// A closing goes on with a cut beside it where their planes are so alike (cosine), and where
+/// tetrahedra are no further from its own, mm: else what lies between the two would come loose.
+/// Numerical.
+const SAME_CUT: (f32, f32) = (0.9, 6.0);
+
 /// Which faces of the brain are cut.
 pub(crate) struct Scissors {
     splitter: Splitter,
@@ -44,6 +49,8 @@ pub(crate) struct Scissors {
     pub cut_mm2: f64,
     is_down: [bool; 2],
     sides: Vec<bool>,
+    /// Of a tetrahedron beside a cut: the normal of that, and which side of it this is.
+    beside: Vec<Option<(Vec3, bool)>>,
 }
 
 impl Scissors {
@@ -59,6 +66,7 @@ impl Scissors {
             cut_mm2: 0.0,
             is_down: [false; 2],
             sides: vec![false; mesh.tets.len()],
+            beside: vec![None; mesh.tets.len()],
         }
     }
 
@@ -97,7 +105,9 @@ impl Scissors {
         let is_gone = |tet: u32| fills.get(tet as usize).is_some_and(|fill| *fill == 0);
         for tet in 0..self.sides.len() {
             let middle: Vec3 = self.splitter.corners(tet as u32).map(|n| self.place(n, positions)).into_iter().sum();
-            self.sides[tet] = (0.25 * middle - tip).dot(y) > 0.0;
+            let ahead_mm = (0.25 * middle - tip).dot(y);
+            let known = self.beside[tet].filter(|(n, _)| n.dot(y).abs() > SAME_CUT.0 && ahead_mm.abs() < SAME_CUT.1);
+            self.sides[tet] = known.map_or(ahead_mm > 0.0, |(n, side)| side == (n.dot(y) > 0.0));
         }
         for tet in 0..self.sides.len() as u32 {
             for (face, next) in self.splitter.neighbours(tet).into_iter().enumerate() {
@@ -119,6 +129,9 @@ impl Scissors {
                 self.splitter.cut(tet, face, is_gone, splits);
                 self.learn(&splits[known..]);
                 self.cuts.push(4 * tet + face as u32);
+                for beside in [tet, next].map(|tet| tet as usize) {
+                    self.beside[beside].get_or_insert((y, self.sides[beside]));
+                }
                 let [a, b, c] = corners;
                 self.cut_mm2 += f64::from(0.5 * (b - a).cross(c - a).length());
             }
@@ -138,11 +151,16 @@ impl Scissors {
         to.extend([self.cut_mm2.to_bits(), self.cuts.len() as u64, splits.len() as u64]);
         to.extend(self.cuts.iter().map(|face| u64::from(*face)));
         to.extend(splits.iter().flat_map(|split| [split.corner, split.from, split.node].map(u64::from)));
+        to.push(self.beside.iter().flatten().count() as u64);
+        for (tet, (normal, side)) in (0u64..).zip(&self.beside).filter_map(|(tet, of)| Some((tet, (*of)?))) {
+            to.push(2 * tet + u64::from(side));
+            to.extend(normal.to_array().map(|x| u64::from(x.to_bits())));
+        }
     }
 
     /// Most words that [`save`](Self::save) appends.
     pub const fn most_words() -> usize {
-        3 + MOST_CUTS + 3 * MOST_SPLITS
+        4 + MOST_CUTS + 3 * MOST_SPLITS + 4 * 2 * MOST_CUTS
     }
 
     /// Takes over what others cut, before the first step; returns the splits. `None`, and no change
@@ -156,6 +174,11 @@ impl Scissors {
         for _ in 0..count {
             let [corner, from, node] = [words.next()?, words.next()?, words.next()?].map(|word| word as u32);
             splits.push(Split { corner, from, node });
+        }
+        for _ in 0..words.next()? {
+            let [word, x, y, z] = [words.next()?, words.next()?, words.next()?, words.next()?];
+            let normal = Vec3::from_array([x, y, z].map(|bits| f32::from_bits(bits as u32)));
+            *self.beside.get_mut((word / 2) as usize)? = Some((normal, word % 2 == 1));
         }
         self.splitter.restore(&cuts, &splits)?;
         self.learn(&splits);

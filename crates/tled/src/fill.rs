@@ -135,11 +135,16 @@ impl Fills {
             .map(|&(_, triangle, index)| (triangle, index))
     }
 
+    /// Whether anything is left around a mesh node.
+    pub fn is_left(&self, node: u32) -> bool {
+        self.tets_of_node.row(node as usize).iter().any(|&t| self.now[t as usize] > 0)
+    }
+
     /// Mass with weight of a mesh node, g; `None` where nothing is left around it.
     pub fn grams(&self, node: u32) -> Option<f64> {
         let around = self.tets_of_node.row(node as usize);
         let quarter = |&t: &u32| self.quarters[t as usize][1] * share(self.now[t as usize]);
-        around.iter().any(|&t| self.now[t as usize] > 0).then(|| around.iter().map(quarter).sum())
+        self.is_left(node).then(|| around.iter().map(quarter).sum())
     }
 
     /// Node groups of a mesh node with their volumes, mm³.

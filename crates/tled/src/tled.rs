@@ -109,7 +109,9 @@ impl SoftSolver for Tled {
         self.elements.empty_to(from.fills(), &self.body, &self.base.layout);
         let nodes = self.elements.nodes();
         for (node, &place) in self.base.layout.place_of.iter().enumerate() {
-            nodes.set(place as usize, state.positions[node] - self.base.rest[node], state.velocities[node]);
+            let is_left = self.elements.fills.is_left(node as u32);
+            let velocity = if is_left { state.velocities[node] } else { Vec3::ZERO };
+            nodes.set(place as usize, state.positions[node] - self.base.rest[node], velocity);
         }
         self.elements.remember(&from.memory());
         self.elements.wake();

@@ -22,7 +22,17 @@ fn german() -> Language {
 fn panels() -> [Panel; 9] {
     let soft = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator(), Tool::bipolar()];
     let tools = [Tool::burr(3.0), Tool::perforator(), Tool::craniotome()].into_iter().chain(soft).collect();
-    let names = ["burr 6 mm", "perforator 11 mm", "craniotome", "probe", "spatula", "aspirator", "bipolar", "scalpel", "scissors"];
+    let names = [
+        "burr 6 mm",
+        "perforator 11 mm",
+        "craniotome",
+        "probe",
+        "spatula",
+        "aspirator",
+        "bipolar",
+        "scalpel",
+        "scissors",
+    ];
     let options = names.map(|name| (name.to_string(), None)).into();
     let choice = Choice { name: "Tool".into(), options, chosen: 0, tools };
     let by_hand = Panel { by_hand: true, rate_hz: 1000.0, choices: vec![choice], ..Panel::default() };

@@ -192,6 +192,7 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
         "probe" => (start, upright, probe(site, plan)),
         "press" => (start, upright, press(site, plan)),
         "retract" => (start, upright, retract(site, plan)),
+        "cut" => (start, upright, cut(site, plan, upright * Vec3::X)),
         _ => {
             let moves = [craniotomy(site, plan), change(site, plan), probe(site, plan)];
             (start, upright, moves.into_iter().flatten().collect())
@@ -200,7 +201,10 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
     let whole: f64 = moves.iter().map(|m| m.1).sum();
     let mut path = Path::from(start, rotation);
     for Move(label, share, tip, buttons) in moves {
-        if matches!(buttons.taken(), Some(ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel)) {
+        if matches!(
+            buttons.taken(),
+            Some(ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel | ToolKind::Scissors)
+        ) {
             path.through(site.entry);
         }
         path.to(label, duration_ms * share / whole, tip, buttons);
@@ -497,6 +501,37 @@ fn retract(site: &Site, plan: &Plan) -> Vec<Move> {
         Move("withdraw", 4.0, over + aside, HANDS_OFF),
         Move("leave", 4.0, site.below(-plan.away_mm), HANDS_OFF),
     ]
+}
+
+/// Places of a row of closings along the blades, mm, and their depths in the brain, mm, numerical:
+/// scissors cut some 8 mm wide and 10 mm high.
+const SNIPS_MM: ([f32; 5], [f32; 2]) = ([-12.0, -6.0, 0.0, 6.0, 12.0], [5.0, 11.0]);
+
+/// Cuts the brain along a line in two depths, then presses the spatula into the slit and draws it
+/// across.
+fn cut(site: &Site, plan: &Plan, along: Vec3) -> Vec<Move> {
+    let above = |aside_mm: f32| site.below(site.brain_mm - 2.0) + aside_mm * along;
+    let mut moves = vec![Move("take the scissors", 1.5, site.below(-plan.start_mm), Buttons::take(ToolKind::Scissors))];
+    for (deep_mm, aside_mm) in SNIPS_MM.1.into_iter().flat_map(|deep| SNIPS_MM.0.map(|aside| (deep, aside))) {
+        let place = above(aside_mm) + (2.0 + deep_mm) * site.inward;
+        moves.extend([
+            Move("come to the brain", 1.5, above(aside_mm), HANDS_OFF),
+            Move("go in", 1.0, place, HANDS_OFF),
+            Move("close the scissors", 0.3, place, Buttons::PEDAL),
+            Move("draw back", 1.0, above(aside_mm), HANDS_OFF),
+        ]);
+    }
+    let deep = site.below(site.brain_mm + SNIPS_MM.1[1] - plan.spatula_radius_mm);
+    let aside = plan.retract_mm[1] * site.inward.cross(along);
+    moves.extend([
+        Move("take the spatula", 2.0, site.below(-plan.away_mm), Buttons::take(ToolKind::Spatula)),
+        Move("come to the slit", 4.0, site.below(site.brain_mm - plan.spatula_radius_mm - 1.0), HANDS_OFF),
+        Move("go into the slit", 5.0, deep, HANDS_OFF),
+        Move("draw aside", 5.0, deep + aside, HANDS_OFF),
+        Move("hold", 5.0, deep + aside, HANDS_OFF),
+        Move("leave", 4.0, site.below(-plan.away_mm), HANDS_OFF),
+    ]);
+    moves
 }
 
 #[cfg(test)]

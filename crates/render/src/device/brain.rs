@@ -70,7 +70,8 @@ impl Brain {
     /// Updates what is seen of the brain, and the dura over it, from a frame.
     /// Returns whether other triangles are there than before: then the pass is to be bound again.
     pub fn follow(&mut self, gpu: &Gpu, frame: &Frame) -> Result<bool, RenderError> {
-        let is_other = self.border.leave_out(frame.brain_gone) | self.border.cover(frame.dura.as_ref())?;
+        let is_other =
+            self.border.leave_out(frame.brain_gone, frame.brain_splits) | self.border.cover(frame.dura.as_ref())?;
         if is_other {
             self.device = Device::of(gpu, &self.border)?;
         }

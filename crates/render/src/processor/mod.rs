@@ -164,7 +164,7 @@ impl ProcessorRenderer {
         [frame.bone_paint, frame.brain_paint].into_iter().flatten().try_for_each(Paint::check)?;
         let followed = self.bricks.follow(self.bricks_per_frame);
         if let Some(brain) = &mut self.brain {
-            brain.leave_out(frame.brain_gone);
+            brain.leave_out(frame.brain_gone, frame.brain_splits);
             brain.cover(frame.dura.as_ref())?;
             brain.follow(frame.brain_positions, &frame.balls())?;
             brain.stain(frame.brain_stains);

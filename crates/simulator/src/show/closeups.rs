@@ -38,6 +38,7 @@ impl SessionSetup {
         let plain = |camera: Camera| Frame {
             show_bone: shown,
             brain_gone: Some(&gone[..]).filter(|gone| !gone.is_empty()),
+            brain_splits: &end.splits,
             brain_stains: Some(&end.wound.bleeding.stains[..]).filter(|stains| !stains.is_empty()),
             dura: leaves(&end.wound.dura),
             slices: SliceLook { shown: false, ..SliceLook::default() },

@@ -33,8 +33,9 @@ pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
-    let on_tissue = Some(sample.tool.kind)
-        .filter(|kind| matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel | ToolKind::Scissors));
+    let on_tissue = Some(sample.tool.kind).filter(|kind| {
+        matches!(kind, ToolKind::Aspirator | ToolKind::Bipolar | ToolKind::Scalpel | ToolKind::Scissors)
+    });
     let brain_mm = match view.brain_distance_mm {
         mm if mm.is_finite() => format!("{mm:.1} mm"),
         _ => "no brain here".into(),

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
+use trepan_mesh::Split;
 use trepan_patient::opening::eye;
 use trepan_render::{Camera, Frame, Image, Leaves, Overlay, Painter, SliceLook};
 use trepan_report::page::Shot;
@@ -91,6 +92,8 @@ pub(crate) struct Shape {
     /// What is left of its tetrahedra, of 65535, and which are gone; empty where none can go.
     pub fills: Vec<u16>,
     pub gone: Vec<bool>,
+    /// Splits of its nodes.
+    pub splits: Vec<Split>,
     /// Its wound.
     pub wound: Wound,
 }
@@ -106,6 +109,9 @@ impl Shape {
     pub fn take(&mut self, soft: &SoftFrame) {
         self.positions.clone_from(&soft.positions);
         self.fills.clone_from(&soft.fills);
+        if self.splits.len() != soft.splits.len() {
+            self.splits.clone_from(&soft.splits);
+        }
         self.gone.clear();
         self.gone.extend(soft.fills.iter().map(|fill| *fill == 0));
     }
@@ -154,6 +160,7 @@ pub(crate) fn frame<'a>(
         drilling: view.sample.drilling,
         overlay: Overlay { force: arrow(view), ..Overlay::default() },
         brain_positions: Some(&brain.positions[..]).filter(|positions| !positions.is_empty()),
+        brain_splits: &brain.splits,
         brain_gone: Some(&brain.gone[..]).filter(|gone| !gone.is_empty()),
         brain_stains: Some(&brain.wound.bleeding.stains[..]).filter(|stains| !stains.is_empty()),
         dura: leaves(&brain.wound.dura),

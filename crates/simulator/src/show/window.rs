@@ -335,7 +335,7 @@ impl window::Session for Show {
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let step = self.guide.as_mut().map(|guide| {
-            let Wound { bleeding, dura } = &self.brain.wound;
+            let Wound { bleeding, dura, .. } = &self.brain.wound;
             let taken_ml = self.shown.taken_ml(&self.brain);
             guide.follow(view, [taken_ml, bleeding.rate_ml_per_min.into(), dura.incised_mm.into()])
         });
