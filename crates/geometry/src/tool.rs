@@ -131,9 +131,9 @@ impl Tool {
         Self { kind: ToolKind::Scalpel, shaft_radius_mm: 0.5, ..Self::probe(0.5) }
     }
 
-    /// Microscissors, here closed: a rod of 1.6 mm with a round end; their blades lie in the plane
-    /// of the x axis.
+    /// Microscissors, here closed: a rod of 3 mm with a round end; their blades lie in the plane of
+    /// the x axis.
     pub const fn scissors() -> Self {
-        Self { kind: ToolKind::Scissors, shaft_radius_mm: 0.8, ..Self::probe(0.8) }
+        Self { kind: ToolKind::Scissors, shaft_radius_mm: 1.5, ..Self::probe(1.5) }
     }
 }

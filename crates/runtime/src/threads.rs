@@ -101,6 +101,7 @@ fn collision_loop(
             (loads.gravity, loads.fluid) = (stage.loads().gravity, stage.loads().fluid);
             loads.contacts.copy_from(&stage.loads().contacts);
             loads.fills.clone_from(&stage.loads().fills);
+            loads.contact_splits = stage.loads().contact_splits;
             if loads.splits.len() != stage.loads().splits.len() {
                 loads.splits.clone_from(&stage.loads().splits);
             }

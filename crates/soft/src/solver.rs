@@ -122,6 +122,29 @@ pub struct Loads {
     /// Splits of nodes by all cuts so far. Whoever moves the loads has a solver with them made, by
     /// [`split`](SoftSolver::split).
     pub splits: Vec<Split>,
+    /// How many of those the contacts know: nodes that later ones split stand for their copies too.
+    pub contact_splits: u32,
+}
+
+impl Loads {
+    /// Shares the contacts of nodes with the copies that they got since: half of each for each.
+    pub fn share_contacts(&mut self, solver_splits: usize) {
+        let known = self.contact_splits as usize;
+        let mut last = None;
+        for split in self.splits.get(known..solver_splits).unwrap_or_default() {
+            if last.replace(split.node) == Some(split.node) {
+                continue;
+            }
+            for contact in self.contacts.iter_mut() {
+                let weight: f32 = contact.nodes().filter(|(n, _)| *n == split.from).map(|(_, weight)| weight).sum();
+                if weight != 0.0 {
+                    contact.reweight(|n, own| if n == split.from { 0.5 * own } else { own });
+                    contact.add(split.node, 0.5 * weight);
+                }
+            }
+        }
+        self.contact_splits = self.contact_splits.max(solver_splits as u32);
+    }
 }
 
 /// What happened in one step; every count is of this step alone.

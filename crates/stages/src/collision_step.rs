@@ -35,6 +35,7 @@ impl CollisionStage {
         let first = SecondTool { tool: sample.tool, slot: sample.slot, state: sample.state };
         self.touch(0, Some(first), soft);
         self.touch(1, sample.second, soft);
+        self.smooth_steps = self.smooth_steps.saturating_sub(1);
         let is_open = self.meet_dura(sample, soft);
         self.cut(sample, soft);
         self.aspirate(sample, soft);
@@ -61,7 +62,13 @@ impl CollisionStage {
             None => (step.patch, step.points_in_contact) = (SurfacePatch::default(), 0),
         }
         let couple_mm = if self.with_torque { step.patch.couple_mm } else { Vec3::ZERO };
-        self.patches[hand] = SurfacePatch { tissue_ms: soft.time_ms, couple_mm, ..step.patch };
+        let before = std::mem::replace(
+            &mut self.patches[hand],
+            SurfacePatch { tissue_ms: soft.time_ms, couple_mm, ..step.patch },
+        );
+        if self.smooth_steps > 0 {
+            slow_down(&before, &mut self.patches[hand]);
+        }
     }
 
     /// Lets the tool meet the dura; returns whether that is open.
@@ -80,6 +87,8 @@ impl CollisionStage {
         }
         self.tools.iter_mut().for_each(|tool| tool.split(new));
         self.followed = soft.splits.len();
+        self.smooth_steps = SMOOTH_STEPS;
+        self.loads.contact_splits = self.followed as u32;
         if let Some(bleeder) = &mut self.bleeder {
             bleeder.split(&soft.splits, Some(&soft.positions), &mut self.wound.bleeding);
         }
@@ -133,6 +142,20 @@ impl CollisionStage {
         if let Some(folds) = self.folds.as_mut().filter(|_| self.settling.is_open()) {
             folds.press(&soft.positions, &mut self.loads.contacts);
         }
+    }
+}
+
+/// Steps after a cut in which a hand's force changes slowly, and its change in each, N. A lip that
+/// opens lets go of the tool within a millisecond. Numerical.
+const SMOOTH_STEPS: u32 = 100;
+const SLOW_N: f32 = 0.03;
+
+/// Lets the force of a patch differ from that before by [`SLOW_N`] at most.
+fn slow_down(before: &SurfacePatch, now: &mut SurfacePatch) {
+    let (was, is) = (before.force_n * before.normal, now.force_n * now.normal);
+    let force = was + (is - was).clamp_length_max(SLOW_N);
+    if force != is && force.is_finite() {
+        (now.force_n, now.normal) = (force.length(), force.normalize_or_zero());
     }
 }
 
@@ -208,6 +231,8 @@ pub struct CollisionStage {
     scissors: Option<Scissors>,
     /// Splits that contact follows.
     followed: usize,
+    /// Steps in which the hands' forces still change slowly, after a cut.
+    smooth_steps: u32,
     bleeder: Option<Bleeder>,
     dura: Option<Membrane>,
     wound: Wound,
@@ -251,6 +276,7 @@ impl CollisionStage {
             aspirator: None,
             scissors: None,
             followed: 0,
+            smooth_steps: 0,
             bleeder: None,
             dura: None,
             wound: Wound::default(),

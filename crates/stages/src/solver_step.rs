@@ -42,6 +42,8 @@ impl SolverStage {
             if self.loads.splits.len() != loads.splits.len() {
                 self.loads.splits.clone_from(&loads.splits);
             }
+            self.loads.contact_splits = loads.contact_splits;
+            self.loads.share_contacts(self.splits);
             (self.contact_seq, self.followed_ms) = (contact_seq, 0.0);
             self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
         }
@@ -149,6 +151,7 @@ impl SolverStage {
             }
         }
         self.splits = to;
+        self.loads.share_contacts(to);
         if let Coming::Cheaper = coming {
             self.solver_faults.cheaper_from_ms = Some(self.time_ms);
         }
