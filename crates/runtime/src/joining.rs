@@ -245,6 +245,7 @@ mod tests {
     use trepan_contact::SurfacePatch;
     use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3};
     use trepan_haptics::{Reading, Status};
+    use trepan_mesh::Split;
     use trepan_soft::{Body, Material, boxes};
     use trepan_stages::haptic_config::HapticConfig;
     use trepan_stages::haptic_tick::{HapticStage, SecondTool, TickInput, ToolSample};
@@ -271,7 +272,8 @@ mod tests {
         let collision = CollisionStage::new(Program::Integrated, &mesh, &Default::default(), None).unwrap();
         let collision =
             collision.settling(Settling::new(0.1, Vec3::NEG_Y, Vec3::Z)).aspirating(&mesh, &vec![0.5; tets]);
-        let collision = collision.unwrap().bleeding(&mesh, &vec![brain; tets], Vec3::Z);
+        let collision = collision.unwrap().cutting(&mesh, &vec![0.5; tets]);
+        let collision = collision.bleeding(&mesh, &vec![brain; tets], Vec3::Z);
         let body = Body::uniform(mesh, vec![0, 1, 2], Material::BRAIN);
         let solver = trepan_tled::Tled::new(&body, &Default::default()).unwrap();
         let solver = SolverStage::new(Box::new(solver)).resectable(tets);
@@ -346,9 +348,25 @@ mod tests {
         stages.haptic.bone().unwrap().snapshot().data
     }
 
-    fn wound(stages: &Stages) -> (&[u16], f64, &trepan_stages::Bleeding) {
+    fn wound(stages: &Stages) -> (&[u16], f64, &trepan_stages::Bleeding, &[Split], f64) {
         let collision = &stages.tissue.as_ref().unwrap().collision;
-        (&collision.loads().fills, collision.aspirated_mm3(), &collision.wound().bleeding)
+        let (loads, wound) = (collision.loads(), collision.wound());
+        (&loads.fills, collision.aspirated_mm3(), &wound.bleeding, &loads.splits, wound.cut_mm2)
+    }
+
+    /// Closes scissors in the block, and lets the solver follow.
+    fn cut(stages: &mut Stages, ms: f64) {
+        let tray = Program::Integrated.tray();
+        let slot = tray.iter().position(|tool| tool.kind == ToolKind::Scissors).unwrap();
+        let tissue = stages.tissue.as_mut().unwrap();
+        let mut frame = SoftFrame::default();
+        let mut state = ToolState::at(Pose::from_translation(Vec3::new(3.1, 9.2, 8.0)));
+        (state.time_ms, state.buttons) = (ms, Buttons::PEDAL);
+        let sample = ToolSample { tick: 1, state, tool: tray[slot], slot, drilling: false, second: None, idle: false };
+        tissue.solver.publish(&mut frame);
+        let seq = tissue.collision.step(&sample, &frame).seq;
+        tissue.solver.wait_for_splits(tissue.collision.loads(), tissue.collision.loads().splits.len());
+        tissue.solver.step(tissue.collision.loads(), seq);
     }
 
     #[test]
@@ -361,6 +379,7 @@ mod tests {
         trainee.haptic.restore(FAR, true, 5.0, &[]);
         assert_eq!(press_flap(&mut trainee), FlapPlace::Away);
         (1..=ms).for_each(|ms| _ = step(&mut trainee, ms, 0.0));
+        cut(&mut trainee, ms as f64);
         while !step(&mut trainee, ms, 0.0).save(&mut Vec::new()) {
             ms += 1;
         }
@@ -374,6 +393,7 @@ mod tests {
         assert!(begin(&damaged, &mut replay).unwrap_err().contains("damaged"));
         assert!(bone(&watcher) == bone(&trainee) && watcher.haptic.is_open());
         assert_eq!(wound(&watcher), wound(&trainee));
+        assert!(!wound(&watcher).3.is_empty() && wound(&watcher).4 > 0.0);
         assert!(wound(&watcher).2.stains.iter().any(|stain| *stain > 0));
         let arms = [&mut watcher, &mut replay, &mut trainee].map(|stages| ticked(stages, 9, Buttons(0)));
         assert_eq!(arms, [Some((Tool::spatula(), FAR)), Some((Tool::spatula(), FAR)), None]);

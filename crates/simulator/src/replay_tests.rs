@@ -109,6 +109,14 @@ fn aspirating(ms: u64) -> ToolState {
     ToolState { time_ms: ms as f64, buttons, ..ToolState::at(world_from_tool) }
 }
 
+/// The same with scissors that close every 100 ms.
+fn cutting(ms: u64) -> ToolState {
+    let ToolState { world_from_tool, .. } = hand(ms.max(PROBE));
+    let closes = if ms % 100 < 20 { Buttons::PEDAL } else { Buttons(0) };
+    let buttons = if ms < PROBE + 50 { Buttons::take(ToolKind::Scissors) } else { closes };
+    ToolState { time_ms: ms as f64, buttons, ..ToolState::at(world_from_tool) }
+}
+
 /// The second hand's aspirator presses the brain beside the probe of the first.
 fn beside(ms: u64) -> ToolState {
     let deep_mm = if (650..1100).contains(&ms) { 23.0 * ((ms - 650) as f32 / 250.0).min(1.0) } else { 0.0 };
@@ -150,6 +158,10 @@ fn operated_by(
         tissue.solver.publish(&mut frame);
         let collision = tissue.collision.step(&done.sample, &frame);
         (seq, patches) = (collision.seq, *tissue.collision.patches());
+        let cut = tissue.collision.loads().splits.len();
+        if cut > tissue.solver.splits().len() {
+            tissue.solver.wait_for_splits(tissue.collision.loads(), cut);
+        }
         while tissue.solver.time_ms() < tick as f64 {
             recording.solver.extend(tissue.solver.step(tissue.collision.loads(), collision.seq));
         }
@@ -315,6 +327,20 @@ fn an_aspirator_takes_tissue_and_a_replay_feels_the_same() {
     let (_, rival, SolverOutcome { fills: whole, .. }) =
         operated_by((aspirating, None), "--set search=hashed-grid", END);
     assert!(whole.is_empty() && rival.no_aspiration().is_some_and(|why| why.contains("search=walk")));
+}
+
+#[test]
+fn scissors_open_the_brain_and_a_replay_feels_the_same() {
+    let line = "--set element=locking-free --aspiration 50 --bleeding 20";
+    let (recording, _, SolverOutcome { splits, wound, .. }) = operated_by((cutting, None), line, END);
+    assert!(splits.len() > 20 && wound.cut_mm2 > 50.0 && wound.bleeding.bled_ml > 0.0, "{} mm²", wound.cut_mm2);
+    assert!(recording.solver.iter().any(|record| record.splits > 0 && record.splits < splits.len() as u32), "by turns");
+    let again = again(&recording).0;
+    let SolverOutcome { wound: same, .. } = again.solver.unwrap();
+    assert_eq!((same.cut_mm2, same.bleeding), (wound.cut_mm2, wound.bleeding));
+    assert_eq!(again.replayed.unwrap().identical, END - 1);
+    let (_, _, SolverOutcome { splits, .. }) = operated_by((cutting, None), "--set search=hashed-grid", END);
+    assert!(splits.is_empty());
 }
 
 #[test]

@@ -263,8 +263,8 @@ impl Body {
     /// Splits nodes where faces are cut; what a node is (fixed, anchored, of the membrane) its copy
     /// is too. `None`, and no change, where a split does not fit the mesh.
     ///
-    /// A held body stays held: of each part that nothing holds any more one node is tied to its
-    /// place by a spring of 0.001 N/mm.
+    /// Of each part that nothing holds any more one node is tied to its place by a spring that is too
+    /// soft to be felt, 1e-6 N/mm: so the body passes its [check](Self::check), and the part is free.
     pub fn split(&mut self, splits: &[Split]) -> Option<()> {
         let mut mesh = self.mesh.clone();
         mesh.split(splits)?;
@@ -331,7 +331,7 @@ impl Body {
 }
 
 /// Spring that ties a loose part, N/mm; numerical.
-const TIE: f32 = 1e-3;
+const TIE: f32 = 1e-6;
 
 fn span_a_plane(points: &[DVec3]) -> bool {
     let Some(&origin) = points.first() else { return false };

@@ -66,6 +66,12 @@ pub trait SoftSolver: Send {
         &[]
     }
 
+    /// Length of the last step that was made, ms, by half of which velocities are behind; 0 for
+    /// solvers in which they are not.
+    fn last_step_ms(&self) -> f32 {
+        0.0
+    }
+
     /// Goes on from the state, the fills and the stress memory of the solver that
     /// [`cheaper`](Self::cheaper) or [`split`](Self::split) came from; of the latter with its
     /// splits. One that has neither does nothing.

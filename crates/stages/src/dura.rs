@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn an_aspirator_takes_nothing_until_a_scalpel_has_opened_the_dura() {
         let (mut stage, brain) = stage();
-        let [aspirator, scalpel] = [6, 9];
+        let [aspirator, scalpel] = [6, 8];
         assert_eq!(Program::Integrated.tray()[scalpel].kind, ToolKind::Scalpel);
         let at = |x: f32, z: f32| Vec3::new(x, 24.3, z);
         let pressed_n = lead(&mut stage, &brain, aspirator, [at(24.0, 22.0), at(24.0, 15.5)], 1);

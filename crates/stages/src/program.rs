@@ -71,7 +71,7 @@ impl Program {
     pub fn tray(self) -> &'static [Tool] {
         match self {
             Self::Craniotomy => &TRAY[..BONE_TOOLS],
-            Self::Brain => &TRAY[BONE_TOOLS..DURA_TOOL],
+            Self::Brain => &BRAIN_TRAY,
             Self::Integrated => &TRAY,
         }
     }
@@ -106,8 +106,8 @@ impl Phase {
 
 /// How many of the tray's tools cut bone; they come first.
 const BONE_TOOLS: usize = 4;
-/// The tool for the dura, which only a skull has.
-const DURA_TOOL: usize = 9;
+/// Tools without a skull, and so without a dura.
+const BRAIN_TRAY: [Tool; 5] = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator(), Tool::bipolar(), Tool::scissors()];
 /// Every tool.
 const TRAY: [Tool; 10] = [
     Tool::burr(3.0),
@@ -118,8 +118,8 @@ const TRAY: [Tool; 10] = [
     Tool::spatula(),
     Tool::aspirator(),
     Tool::bipolar(),
-    Tool::scissors(),
     Tool::scalpel(),
+    Tool::scissors(),
 ];
 
 /// Name of a tool in the tray: its kind and width.

@@ -119,7 +119,7 @@ mod tests {
         ask(NONE, true, true);
         for tool in [7, 8, 9] {
             let taken = ask(Buttons::NEXT_TOOL, true, true);
-            assert_eq!(taken, (Some(Change::Taken), tool), "the bipolar, the scissors, the scalpel");
+            assert_eq!(taken, (Some(Change::Taken), tool), "the bipolar, the scalpel, the scissors");
             ask(NONE, true, true);
         }
         assert_eq!(ask(Buttons::NEXT_TOOL, true, false), (Some(Change::Taken), 0), "back to the bone");

@@ -196,7 +196,10 @@ impl Team {
 
     /// The stress memory, part by part.
     pub fn memory(&self) -> Vec<f32> {
-        self.shared.parts.iter().flat_map(|part| lock(part).memory().to_vec()).collect()
+        let parts = || self.shared.parts.iter();
+        let mut all = Vec::with_capacity(parts().map(|part| lock(part).memory().len()).sum());
+        parts().for_each(|part| all.extend_from_slice(lock(part).memory()));
+        all
     }
 
     /// Takes a stress memory of [`memory`](Self::memory); clears it for one of another length.

@@ -98,6 +98,10 @@ impl SoftSolver for Tled {
         self.elements.memory()
     }
 
+    fn last_step_ms(&self) -> f32 {
+        self.base.elapsed_ms
+    }
+
     fn fills(&self) -> &[u16] {
         &self.elements.fills.now
     }
@@ -114,6 +118,7 @@ impl SoftSolver for Tled {
             nodes.set(place as usize, state.positions[node] - self.base.rest[node], velocity);
         }
         self.elements.remember(&from.memory());
+        self.base.elapsed_ms = from.last_step_ms();
         self.elements.wake();
         self.publish();
     }

@@ -34,8 +34,8 @@ const QUIET: [Key; 22] = [
 ];
 
 /// Slots of a choice that have number keys, in their order.
-pub(crate) const NUMBERS: [Key; 9] =
-    [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
+pub(crate) const NUMBERS: [Key; 10] =
+    [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9, Key::Num0];
 
 /// The newest answer and the time until which it stands, s.
 #[derive(Clone, Debug, Default)]

@@ -82,7 +82,7 @@ const REST: [(&str, &str); 11] = [
     ("right drag", "Orbits the view"),
     ("middle drag", "Pans the view; so does Shift + right drag"),
     ("arrows, Page Up and Down", "Move the tool by half a millimetre"),
-    ("+ and -, 1 to 9", "Zoom; take a tool"),
+    ("+ and -, 1 to 9, 0", "Zoom; take a tool"),
     ("Space, held", "Drills"),
     ("Space", "In a replay: runs or stands still"),
     ("[ and ]", "In a replay: to the event before and after"),

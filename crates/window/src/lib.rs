@@ -10,7 +10,7 @@
 //! | slices | a click sets the point through which they pass, the wheel turns pages |
 //! | right drag; middle drag or Shift + right drag | orbits; pans |
 //! | Space (held) | the drill's pedal |
-//! | 1 to 9, N | takes a tool; the next tool |
+//! | 1 to 9, 0, N | takes a tool; the next tool |
 //! | U, Y, X | undoes a stroke; redoes it; draws the tool back |
 //! | D, F2 to F6 | centres the tool; the whole head from the front, back, left, right, top |
 //! | I, F11 | light or dark; full screen |

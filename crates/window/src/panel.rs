@@ -228,7 +228,7 @@ fn options(ui: &mut egui::Ui, choice: &Choice) -> Option<usize> {
         for (at, (tool, (name, why_not))) in choice.tools.iter().zip(&choice.options).enumerate() {
             let chosen = at == choice.chosen;
             let why_not = why_not.as_deref().filter(|_| !chosen);
-            if tool_icon::show(ui, tool, at + 1, name, (why_not, chosen)) && !chosen {
+            if tool_icon::show(ui, tool, (at + 1) % 10, name, (why_not, chosen)) && !chosen {
                 clicked = Some(at);
             }
         }

@@ -3,6 +3,7 @@
 mod axial;
 mod classes;
 pub mod closed_forms;
+mod cuts;
 mod fronts;
 mod locking;
 mod motion;
@@ -28,6 +29,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.extend(axial::parts());
     parts.extend(outside::parts());
     parts.push(Part::new("tissue classes", classes::run));
+    parts.extend(cuts::parts());
     parts.extend(slender::parts());
     parts.extend(speed::parts());
     parts.extend(stability::parts());
