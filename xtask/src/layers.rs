@@ -20,7 +20,7 @@ const FLOORS: [&[&str]; 12] = [
     &["models"],
     &["report"],
     &["simulator"],
-    &["craniotomy", "brain", "integrated", "trials-scenes", "python"],
+    &["craniotomy", "brain", "integrated", "trials-scenes", "analysis", "python"],
     &["trials-bone", "trials-tissue"],
     &["trials-sessions"],
     &["trials"],
@@ -35,32 +35,48 @@ const KEPT: [(&str, &[&str]); 8] = [
     ("eframe", &["window"]),
     ("mcap", &["link"]),
     ("iceoryx2", &["link"]),
-    ("clap", &["simulator", "trials"]),
+    ("clap", &["simulator", "trials", "analysis"]),
     ("tracing", &["stages", "simulator", "craniotomy", "brain", "integrated"]),
-    ("anyhow", &["evidence", "simulator", "craniotomy", "brain", "integrated", "trials"]),
+    ("anyhow", &["evidence", "simulator", "craniotomy", "brain", "integrated", "trials", "analysis"]),
     ("trepan-trials", &[]),
 ];
 
 /// Words in the sources that only some crates may use (tests and examples are free).
 const WORDS: [(&str, &[&str]); 6] = [
-    ("Instant::now", &["simulator", "evidence", "trials", "gpu", "window", "render", "emulators"]),
+    ("Instant::now", &["simulator", "evidence", "trials", "gpu", "window", "render", "emulators", "analysis"]),
     ("SystemTime", &["link", "simulator", "evidence", "trials"]),
     ("thread::sleep", &["stages", "simulator", "trials", "emulators"]),
     ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
     (
         "std::fs",
-        &["volume", "mesh", "link", "haptics", "render", "window", "simulator", "evidence", "trials", "emulators"],
+        &[
+            "volume",
+            "mesh",
+            "link",
+            "haptics",
+            "render",
+            "window",
+            "simulator",
+            "evidence",
+            "trials",
+            "emulators",
+            "analysis",
+        ],
     ),
     ("unsafe {", &["haptics", "soft", "simulator", "emulators"]),
 ];
 
-/// A crate that is a workspace of its own.
-const APART: &str = "crates/python";
+/// Crates that are a workspace of their own, each with its script `check`.
+pub const APART: [&str; 2] = ["crates/analysis", "crates/python"];
 
 /// All faults found, each one line.
 pub fn check(root: &Path) -> Result<Vec<String>> {
     let mut faults = Vec::new();
-    for package in [packages(root)?, packages(&root.join(APART))?].concat() {
+    let mut all = packages(root)?;
+    for folder in APART {
+        all.extend(packages(&root.join(folder))?);
+    }
+    for package in all {
         let name = short(package["name"].as_str().unwrap_or_default());
         if name == "xtask" {
             continue;
