@@ -14,8 +14,8 @@ use crate::tables::{self, SOURCE_KEY, TABLES, VERSION, VERSION_KEY};
 use anyhow::{Context, Result, bail};
 use datafusion::arrow::array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array};
 use datafusion::parquet::arrow::ArrowWriter;
+use datafusion::parquet::file::metadata::KeyValue;
 use datafusion::parquet::file::reader::{FileReader, SerializedFileReader};
-use datafusion::parquet::record::{Field, Row};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, HashMap};
@@ -33,6 +33,8 @@ const BATCH: usize = 8192;
 const LAG: usize = 4096;
 /// Bytes of a recording's beginning that its ID is made of; numerical.
 const HEAD_BYTES: u64 = 64 * 1024;
+/// Key of program and version in a file's metadata.
+const PROGRAM_KEY: &str = "trepan.program";
 /// File of a partition.
 const PART: &str = "part.parquet";
 
@@ -66,9 +68,13 @@ struct Source {
 }
 
 /// What became of one session.
-enum Done {
-    Written { ticks: u64, seconds: f64, program: String, warnings: Vec<String> },
-    Skipped { program: String },
+#[derive(Default)]
+struct Done {
+    written: bool,
+    ticks: u64,
+    seconds: f64,
+    program: String,
+    warnings: Vec<String>,
 }
 
 /// Exports every recording in a folder and below, on all cores. A recording that fails is listed
@@ -89,12 +95,9 @@ pub fn export(runs: &Path, out: &Path) -> Result<Exported> {
     let done: Vec<_> = sources.par_iter().map(|source| (source, session(source, out))).collect();
     for (source, done) in done {
         match done {
-            Ok(Done::Skipped { program }) => {
-                exported.skipped += 1;
-                *exported.versions.entry(program).or_default() += 1;
-            }
-            Ok(Done::Written { ticks, seconds, program, warnings }) => {
-                exported.written += 1;
+            Ok(Done { written, ticks, seconds, program, warnings }) => {
+                exported.written += usize::from(written);
+                exported.skipped += usize::from(!written);
                 exported.ticks += ticks;
                 exported.seconds += seconds;
                 *exported.versions.entry(program).or_default() += 1;
@@ -171,7 +174,7 @@ fn distinct(
 fn session(source: &Source, out: &Path) -> Result<Done> {
     let partition = |table: &str| out.join(table).join(format!("session={}", source.id));
     if let Some(program) = exported_before(&partition("cases").join(PART), &source.stamp)? {
-        return Ok(Done::Skipped { program });
+        return Ok(Done { program, ..Done::default() });
     }
     let failed = || format!("cannot write into {}; free some disk space", shown(out));
     let folder = tempfile::Builder::new().prefix(".part-").tempdir_in(out).with_context(failed)?;
@@ -195,9 +198,11 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
     if late > 0 {
         warnings.push(format!("{late} records of the second hand came {LAG} ticks late and are null; tell the makers"));
     }
-    write_one(&file("events"), "events", &source.stamp, events(&sink.events)?)?;
-    write_one(&file("scores"), "scores", &source.stamp, score_rows(&scores.unwrap_or_default())?)?;
-    write_one(&file("cases"), "cases", &source.stamp, case_row(&sink, &facts, &streamed)?)?;
+    let program = format!("{} {}", sink.header.app, sink.header.version);
+    let write = |table, rows| write_one(&file(table), table, &source.stamp, &program, rows);
+    write("events", events(&sink.events)?)?;
+    write("scores", score_rows(&scores.unwrap_or_default())?)?;
+    write("cases", case_row(&sink, &facts, &streamed)?)?;
     for table in TABLES {
         let place = partition(table);
         if table == TABLES[0] {
@@ -212,8 +217,7 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
         fs::create_dir_all(&place).with_context(failed)?;
         fs::rename(file(table), place.join(PART)).with_context(failed)?;
     }
-    let program = program(&sink.header);
-    Ok(Done::Written { ticks: sink.ticks, seconds: sink.seconds(), program, warnings })
+    Ok(Done { written: true, ticks: sink.ticks, seconds: sink.seconds(), program, warnings })
 }
 
 /// Program and version if the session was exported from the same files by this version of the
@@ -233,16 +237,7 @@ fn exported_before(cases: &Path, stamp: &str) -> Result<Option<String>> {
     if value(SOURCE_KEY) != Some(stamp) {
         return Ok(None);
     }
-    let row = reader.get_row_iter(None).with_context(damaged)?.next().transpose().with_context(damaged)?;
-    let text = |wanted: &str| match row.iter().flat_map(Row::get_column_iter).find(|(name, _)| *name == wanted) {
-        Some((_, Field::Str(text))) => text.clone(),
-        _ => String::new(),
-    };
-    Ok(Some(format!("{} {}", text("program"), text("version"))))
-}
-
-fn program(header: &SessionHeader) -> String {
-    format!("{} {}", header.app, header.version)
+    Ok(value(PROGRAM_KEY).map(str::to_owned))
 }
 
 fn create(path: &Path, table: &str, stamp: &str) -> Result<ArrowWriter<File>> {
@@ -250,8 +245,9 @@ fn create(path: &Path, table: &str, stamp: &str) -> Result<ArrowWriter<File>> {
     Ok(ArrowWriter::try_new(file, tables::schema(table), Some(tables::properties(table, stamp)))?)
 }
 
-fn write_one(path: &Path, table: &str, stamp: &str, rows: RecordBatch) -> Result<()> {
+fn write_one(path: &Path, table: &str, stamp: &str, program: &str, rows: RecordBatch) -> Result<()> {
     let mut writer = create(path, table, stamp)?;
+    writer.append_key_value_metadata(KeyValue::new(PROGRAM_KEY.to_owned(), program.to_owned()));
     writer.write(&rows)?;
     writer.close()?;
     Ok(())
@@ -364,7 +360,7 @@ fn case_row(sink: &Sink, facts: &Facts, streamed: &Streamed) -> Result<RecordBat
     let text = |value: Option<String>| Arc::new(StringArray::from(vec![value])) as ArrayRef;
     let whole = |value: u64| Arc::new(UInt64Array::from(vec![value])) as ArrayRef;
     let yes = |value: bool| Arc::new(BooleanArray::from(vec![value])) as ArrayRef;
-    let second_device = facts.second.as_ref().and_then(|second| clean(&second.device));
+    let second_device = facts.second["device"].as_str().map(without_paths);
     let losses = streamed.losses();
     let values = vec![
         text(Some(header.app.clone())),

@@ -26,18 +26,10 @@ pub(crate) struct Facts {
     name: Option<String>,
     /// When it began, UTC.
     pub date: Option<String>,
-    /// The second hand.
-    pub second: Option<Second>,
+    /// The second hand; its `device` is read.
+    pub second: serde_json::Value,
     /// Whether a program made the participant.
     pub simulated: bool,
-}
-
-/// The second hand in `summary.json`.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Second {
-    /// Device's name.
-    pub device: Option<String>,
 }
 
 impl Facts {
@@ -102,32 +94,16 @@ pub(crate) fn scores(path: &Path) -> Result<Vec<Score>> {
     Ok(found.into_iter().map(|(name, value)| Score { unit: unit(&name), name, value }).collect())
 }
 
-/// Endings of scores' names, and their units; the longer ones first.
-const UNITS: [(&str, &str); 17] = [
-    ("ml_per_min", "ml/min"),
-    ("seconds", "s"),
-    ("share", "1"),
-    ("count", "1"),
-    ("mm3", "mm3"),
-    ("mm2", "mm2"),
-    ("m_s", "m/s"),
-    ("n_s", "N s"),
-    ("deg", "degrees"),
-    ("mm", "mm"),
-    ("ms", "ms"),
-    ("us", "us"),
-    ("hz", "Hz"),
-    ("ml", "ml"),
-    ("n", "N"),
-    ("s", "s"),
-    ("j", "J"),
-];
+/// Endings of scores' names and their units, in pairs; the longer ones first.
+const UNITS: &str = "ml_per_min ml/min, seconds s, share 1, count 1, mm3 mm3, mm2 mm2, m_s m/s, n_s N s, deg degrees, \
+                     mm mm, ms ms, us us, hz Hz, ml ml, n N, s s, j J";
 
 /// The unit that ends a score's name; empty for none.
 pub(crate) fn unit(name: &str) -> &'static str {
     let last = name.rsplit('.').next().unwrap_or(name);
     let ends = |ending: &str| last.strip_suffix(ending).is_some_and(|rest| rest.is_empty() || rest.ends_with('_'));
-    UNITS.iter().find(|(ending, _)| ends(ending)).map_or("", |(_, unit)| unit)
+    let pairs = UNITS.split(", ").filter_map(|pair| pair.split_once(' '));
+    { pairs }.find(|(ending, _)| ends(ending)).map_or("", |(_, unit)| unit)
 }
 
 /// A text without paths of files: each word with a path is replaced from where the path begins.

@@ -16,7 +16,3 @@ pub mod query;
 pub mod statistics;
 pub mod study;
 pub mod tables;
-
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct ReadmeExamples;

@@ -74,9 +74,9 @@ enum Command {
         /// Folder of the results; it may hold those of an earlier run
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
-        /// key.csv of the plan: lifts the blinding
-        #[arg(long, value_name = "FILE")]
-        key: Option<PathBuf>,
+        /// Lift the blinding: show what is behind each letter
+        #[arg(long)]
+        unblind: bool,
     },
     /// Make sessions and answers of simulated participants, to try a protocol
     Simulate {
@@ -107,7 +107,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Query { runs, sql, csv } => run_query(runs, sql, csv.as_deref()),
         Command::Plan { protocol, out } => plan(protocol, out.as_deref()),
         Command::Check { protocol, runs } => check(protocol, runs),
-        Command::Study { protocol, runs, out, key } => study(protocol, runs, out, key.as_deref()),
+        Command::Study { protocol, runs, out, unblind } => study(protocol, runs, out, *unblind),
         Command::Simulate { protocol, out, seed } => {
             let sessions = study::simulate::simulate(&Protocol::read(protocol)?, out, *seed)?;
             println!("{sessions} sessions of simulated participants in {}; nobody operated", files::shown(out));
@@ -201,9 +201,9 @@ fn check(protocol: &Path, runs: &Path) -> Result<()> {
     Ok(())
 }
 
-fn study(protocol: &Path, runs: &Path, out: &Path, key: Option<&Path>) -> Result<()> {
+fn study(protocol: &Path, runs: &Path, out: &Path, unblind: bool) -> Result<()> {
     let protocol = Protocol::read(protocol)?;
-    let names = key.map(|path| lift(path, &protocol)).transpose()?.unwrap_or_default();
+    let names = if unblind { study::plan(&protocol).names(&protocol) } else { BTreeMap::new() };
     let (runs, answers, missing) = gather(&protocol, runs, &out.join("tables"))?;
     let results = study::analyse(&protocol, &runs, &answers);
     study::write(&protocol, &results, &missing, &names, out)?;
@@ -215,19 +215,4 @@ fn study(protocol: &Path, runs: &Path, out: &Path, key: Option<&Path>) -> Result
     }
     println!("{}", files::shown(&out.join("study.html")));
     Ok(())
-}
-
-/// The names behind the letters, by `key.csv`.
-fn lift(path: &Path, protocol: &Protocol) -> Result<BTreeMap<String, String>> {
-    let remedy =
-        || format!("{} is no key of this protocol; give the key.csv that `plan --out` wrote", files::shown(path));
-    let mut names = BTreeMap::new();
-    for record in csv::Reader::from_path(path).with_context(remedy)?.records() {
-        let record = record.with_context(remedy)?;
-        names.insert(record.get(0).unwrap_or_default().to_owned(), record.get(1).unwrap_or_default().to_owned());
-    }
-    if names.len() != protocol.conditions.len() {
-        bail!("{}: it has {} letters, the protocol {}", remedy(), names.len(), protocol.conditions.len());
-    }
-    Ok(names)
 }

@@ -7,13 +7,14 @@
 use crate::export;
 use crate::files::shown;
 use crate::tables::{TABLES, schema};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use datafusion::arrow::array::RecordBatch;
 use datafusion::arrow::csv::WriterBuilder;
 use datafusion::arrow::datatypes::DataType;
 use datafusion::arrow::util::pretty::pretty_format_batches;
 use datafusion::datasource::file_format::parquet::ParquetFormat;
 use datafusion::datasource::listing::ListingOptions;
+use datafusion::error::DataFusionError;
 use datafusion::execution::SendableRecordBatchStream;
 use datafusion::execution::context::SQLOptions;
 use datafusion::prelude::{SessionConfig, SessionContext};
@@ -74,12 +75,11 @@ impl Database {
 
     async fn stream(&self, sql: &str) -> Result<SendableRecordBatchStream> {
         let reads = SQLOptions::new().with_allow_ddl(false).with_allow_dml(false).with_allow_statements(false);
-        let remedy = || {
-            let columns = TABLES.map(|table| format!("{table} (session, {})", names(table)));
-            format!("this query cannot run: {sql}; the tables are {}", columns.join("; "))
-        };
-        let frame = self.context.sql_with_options(sql, reads).await.with_context(remedy)?;
-        frame.execute_stream().await.with_context(remedy)
+        let columns = TABLES.map(|table| format!("{table} (session, {})", names(table))).join("; ");
+        // Its sources say the same again.
+        let fault = |fault: DataFusionError| anyhow!("{fault}\nThe query cannot run: {sql}\nThe tables are {columns}");
+        let frame = self.context.sql_with_options(sql, reads).await.map_err(fault)?;
+        frame.execute_stream().await.map_err(fault)
     }
 
     /// All rows of a query.
@@ -125,7 +125,7 @@ impl Database {
 fn names(table: &str) -> String {
     let schema = schema(table);
     let names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();
-    if table == "ticks" { "tick, time_ms, …: see `describe ticks`".into() } else { names.join(", ") }
+    if table == "ticks" { "tick, time_ms… as `describe ticks` says".into() } else { names.join(", ") }
 }
 
 /// Whether a folder holds exported tables.

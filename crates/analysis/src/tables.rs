@@ -5,15 +5,14 @@
 //! quaternions four. Columns of the second hand begin with `second_` and are null without it.
 
 use anyhow::Result;
-use datafusion::arrow::array::{
-    ArrayRef, BooleanArray, Float32Array, Float64Array, RecordBatch, UInt8Array, UInt32Array, UInt64Array,
+use datafusion::arrow::array::{ArrayRef, BooleanArray, PrimitiveArray, RecordBatch};
+use datafusion::arrow::datatypes::{
+    ArrowPrimitiveType, DataType, Field, Float32Type, Float64Type, Schema, SchemaRef, UInt8Type, UInt32Type, UInt64Type,
 };
-use datafusion::arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use datafusion::parquet::basic::{Compression, Encoding, ZstdLevel};
 use datafusion::parquet::file::metadata::KeyValue;
 use datafusion::parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use std::sync::{Arc, LazyLock};
-use trepan_geometry::{Quat, Vec3};
 use trepan_link::wire::{SecondRecord, TickRecord};
 
 /// Names of the tables.
@@ -27,149 +26,127 @@ pub const SOURCE_KEY: &str = "trepan.source";
 /// Longest row group, rows.
 const ROW_GROUP: usize = 1 << 17;
 
-/// How the values of a column come from a tick, or from the second hand's.
-#[derive(Clone, Copy)]
-enum Get {
-    F64(fn(&TickRecord) -> f64),
-    F32(fn(&TickRecord) -> f32),
-    /// A component of a vector.
-    Axis(fn(&TickRecord) -> Vec3, usize),
-    /// A component of a rotation's quaternion.
-    Turn(fn(&TickRecord) -> Quat, usize),
-    U64(fn(&TickRecord) -> u64),
-    U32(fn(&TickRecord) -> u32),
-    U8(fn(&TickRecord) -> u8),
-    Flag(u32),
-    SecondF32(fn(&SecondRecord) -> f32),
-    SecondAxis(fn(&SecondRecord) -> Vec3, usize),
-    SecondTurn(fn(&SecondRecord) -> Quat, usize),
-    SecondU32(fn(&SecondRecord) -> u32),
-    SecondFlag(u32),
-}
+/// Values of a column from ticks and the second hand's records of the same numbers.
+type Values = Box<dyn Fn(&[TickRecord], &[Option<SecondRecord>]) -> ArrayRef + Send + Sync>;
 
 /// A column of `ticks`.
 struct Column {
-    name: String,
-    unit: &'static str,
-    get: Get,
+    field: Field,
+    values: Values,
 }
 
 static TICK_COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
-    let mut all = Vec::new();
-    first_hand(&mut all);
-    second_hand(&mut all);
-    all
+    let mut all = Columns(Vec::new());
+    all.first_hand();
+    all.second_hand();
+    all.0
 });
 
-/// Adds columns: of each name with its `*`, x, y, z and, for four, w.
-fn add<const N: usize>(all: &mut Vec<Column>, name: &str, unit: &'static str, get: impl Fn(usize) -> Get) {
-    let axis = |at: usize| if N == 1 { "" } else { ["x", "y", "z", "w"][at] };
-    all.extend((0..N).map(|at| Column { name: name.replace('*', axis(at)), unit, get: get(at) }));
-}
+/// Columns in order. In a name, `*` stands for x, y, z and w.
+struct Columns(Vec<Column>);
 
-fn first_hand(all: &mut Vec<Column>) {
-    use Get::{Axis, F32, F64, Flag, Turn, U8, U32, U64};
-    add::<1>(all, "tick", "1", |_| U64(|t| t.tick));
-    add::<1>(all, "time_ms", "ms", |_| F64(|t| t.time_ms));
-    add::<3>(all, "device_*_mm", "mm", |at| Axis(|t| t.device.translation, at));
-    add::<4>(all, "device_q*", "1", |at| Turn(|t| t.device.rotation, at));
-    add::<3>(all, "velocity_*_m_s", "m/s", |at| Axis(|t| t.twist.linear, at));
-    add::<3>(all, "rotation_*_rad_ms", "rad/ms", |at| Axis(|t| t.twist.angular, at));
-    add::<1>(all, "buttons", "bits", |_| U32(|t| t.buttons));
-    add::<3>(all, "proxy_*_mm", "mm", |at| Axis(|t| t.proxy.translation, at));
-    add::<4>(all, "proxy_q*", "1", |at| Turn(|t| t.proxy.rotation, at));
-    add::<3>(all, "force_*_n", "N", |at| Axis(|t| t.wrench.force, at));
-    add::<3>(all, "torque_*_n_mm", "N mm", |at| Axis(|t| t.wrench.torque, at));
-    add::<1>(all, "tissue_n", "N", |_| F32(TickRecord::tissue_n));
-    add::<3>(all, "normal_*", "1", |at| Axis(|t| t.contact_normal, at));
-    add::<1>(all, "depth_mm", "mm", |_| F32(|t| t.depth_mm));
-    add::<1>(all, "tissue_depth_mm", "mm", |_| F32(|t| t.tissue_depth_mm));
-    add::<1>(all, "removed_mm3", "mm3", |_| F32(|t| t.removed_mm3));
-    add::<1>(all, "spindle_rpm", "1/min", |_| F32(|t| t.spindle_rpm));
-    add::<1>(all, "brain_distance_mm", "mm", |_| F32(|t| t.brain_distance_mm));
-    add::<1>(all, "compute_us", "us", |_| F32(|t| t.compute_us));
-    add::<1>(all, "phase", "1", |_| U8(|t| t.phase));
-    add::<1>(all, "tool", "1", |_| U8(|t| t.tool));
-    for (name, mask) in [
-        ("late", TickRecord::LATE),
-        ("held", TickRecord::HELD),
-        ("clamped", TickRecord::CLAMPED),
-        ("drilling", TickRecord::DRILLING),
-        ("stale", TickRecord::STALE),
-        ("released", TickRecord::RELEASED),
-        ("lost", TickRecord::LOST),
-        ("through", TickRecord::THROUGH),
-        ("undoing", TickRecord::UNDOING),
-    ] {
-        add::<1>(all, name, "", |_| Flag(mask));
+impl Columns {
+    fn first<T: ArrowPrimitiveType>(
+        &mut self,
+        name: &str,
+        unit: &str,
+        get: impl Fn(&TickRecord) -> T::Native + Send + Sync + 'static,
+    ) {
+        let values: Values =
+            Box::new(move |ticks, _| Arc::new(PrimitiveArray::<T>::from_iter_values(ticks.iter().map(&get))));
+        self.0.push(Column { field: field(name, unit, T::DATA_TYPE, false), values });
     }
-}
 
-fn second_hand(all: &mut Vec<Column>) {
-    use Get::{SecondAxis, SecondF32, SecondFlag, SecondTurn, SecondU32};
-    add::<3>(all, "second_device_*_mm", "mm", |at| SecondAxis(|s| s.device.translation, at));
-    add::<4>(all, "second_device_q*", "1", |at| SecondTurn(|s| s.device.rotation, at));
-    add::<3>(all, "second_velocity_*_m_s", "m/s", |at| SecondAxis(|s| s.twist.linear, at));
-    add::<3>(all, "second_rotation_*_rad_ms", "rad/ms", |at| SecondAxis(|s| s.twist.angular, at));
-    add::<1>(all, "second_buttons", "bits", |_| SecondU32(|s| s.buttons));
-    add::<3>(all, "second_proxy_*_mm", "mm", |at| SecondAxis(|s| s.proxy.translation, at));
-    add::<4>(all, "second_proxy_q*", "1", |at| SecondTurn(|s| s.proxy.rotation, at));
-    add::<3>(all, "second_force_*_n", "N", |at| SecondAxis(|s| s.wrench.force, at));
-    add::<3>(all, "second_torque_*_n_mm", "N mm", |at| SecondAxis(|s| s.wrench.torque, at));
-    add::<1>(all, "second_depth_mm", "mm", |_| SecondF32(|s| s.depth_mm));
-    add::<1>(all, "second_tissue_depth_mm", "mm", |_| SecondF32(|s| s.tissue_depth_mm));
-    for (name, mask) in [
-        ("second_clamped", TickRecord::CLAMPED),
-        ("second_stale", TickRecord::STALE),
-        ("second_released", TickRecord::RELEASED),
-        ("second_lost", TickRecord::LOST),
-    ] {
-        add::<1>(all, name, "", |_| SecondFlag(mask));
+    fn second<T: ArrowPrimitiveType>(
+        &mut self,
+        name: &str,
+        unit: &str,
+        get: impl Fn(&SecondRecord) -> T::Native + Send + Sync + 'static,
+    ) {
+        let values: Values = Box::new(move |_, second| {
+            let values = second.iter().map(|record| record.as_ref().map(&get));
+            Arc::new(PrimitiveArray::<T>::from_iter(values))
+        });
+        self.0.push(Column { field: field(name, unit, T::DATA_TYPE, true), values });
     }
-}
 
-impl Get {
-    /// Type of the values, and whether they are null without a second hand.
-    fn kind(self) -> (DataType, bool) {
-        match self {
-            Self::F64(_) => (DataType::Float64, false),
-            Self::F32(_) | Self::Axis(..) | Self::Turn(..) => (DataType::Float32, false),
-            Self::U64(_) => (DataType::UInt64, false),
-            Self::U32(_) => (DataType::UInt32, false),
-            Self::U8(_) => (DataType::UInt8, false),
-            Self::Flag(_) => (DataType::Boolean, false),
-            Self::SecondF32(_) | Self::SecondAxis(..) | Self::SecondTurn(..) => (DataType::Float32, true),
-            Self::SecondU32(_) => (DataType::UInt32, true),
-            Self::SecondFlag(_) => (DataType::Boolean, true),
+    fn vector<const N: usize>(&mut self, name: &str, unit: &str, get: fn(&TickRecord) -> [f32; N]) {
+        for (at, axis) in AXES.into_iter().enumerate().take(N) {
+            self.first::<Float32Type>(&name.replace('*', axis), unit, move |tick| get(tick)[at]);
         }
     }
 
-    fn values(self, ticks: &[TickRecord], second: &[Option<SecondRecord>]) -> ArrayRef {
-        let real = |get: &dyn Fn(&TickRecord) -> f32| {
-            Arc::new(Float32Array::from_iter_values(ticks.iter().map(get))) as ArrayRef
-        };
-        let of_second = |get: &dyn Fn(&SecondRecord) -> f32| {
-            Arc::new(second.iter().map(|s| s.as_ref().map(get)).collect::<Float32Array>()) as ArrayRef
-        };
-        match self {
-            Self::F64(get) => Arc::new(Float64Array::from_iter_values(ticks.iter().map(get))),
-            Self::F32(get) => real(&get),
-            Self::Axis(get, at) => real(&|tick| get(tick)[at]),
-            Self::Turn(get, at) => real(&|tick| get(tick).to_array()[at]),
-            Self::U64(get) => Arc::new(UInt64Array::from_iter_values(ticks.iter().map(get))),
-            Self::U32(get) => Arc::new(UInt32Array::from_iter_values(ticks.iter().map(get))),
-            Self::U8(get) => Arc::new(UInt8Array::from_iter_values(ticks.iter().map(get))),
-            Self::Flag(mask) => Arc::new(ticks.iter().map(|tick| Some(tick.has(mask))).collect::<BooleanArray>()),
-            Self::SecondF32(get) => of_second(&get),
-            Self::SecondAxis(get, at) => of_second(&|s| get(s)[at]),
-            Self::SecondTurn(get, at) => of_second(&|s| get(s).to_array()[at]),
-            Self::SecondU32(get) => Arc::new(second.iter().map(|s| s.as_ref().map(get)).collect::<UInt32Array>()),
-            Self::SecondFlag(mask) => {
-                Arc::new(second.iter().map(|s| s.as_ref().map(|s| s.has(mask))).collect::<BooleanArray>())
-            }
+    fn second_vector<const N: usize>(&mut self, name: &str, unit: &str, get: fn(&SecondRecord) -> [f32; N]) {
+        for (at, axis) in AXES.into_iter().enumerate().take(N) {
+            self.second::<Float32Type>(&name.replace('*', axis), unit, move |second| get(second)[at]);
+        }
+    }
+
+    fn first_hand(&mut self) {
+        self.first::<UInt64Type>("tick", "1", |t| t.tick);
+        self.first::<Float64Type>("time_ms", "ms", |t| t.time_ms);
+        self.vector("device_*_mm", "mm", |t| t.device.translation.to_array());
+        self.vector("device_q*", "1", |t| t.device.rotation.to_array());
+        self.vector("velocity_*_m_s", "m/s", |t| t.twist.linear.to_array());
+        self.vector("rotation_*_rad_ms", "rad/ms", |t| t.twist.angular.to_array());
+        self.first::<UInt32Type>("buttons", "bits", |t| t.buttons);
+        self.vector("proxy_*_mm", "mm", |t| t.proxy.translation.to_array());
+        self.vector("proxy_q*", "1", |t| t.proxy.rotation.to_array());
+        self.vector("force_*_n", "N", |t| t.wrench.force.to_array());
+        self.vector("torque_*_n_mm", "N mm", |t| t.wrench.torque.to_array());
+        self.first::<Float32Type>("tissue_n", "N", TickRecord::tissue_n);
+        self.vector("normal_*", "1", |t| t.contact_normal.to_array());
+        self.first::<Float32Type>("depth_mm", "mm", |t| t.depth_mm);
+        self.first::<Float32Type>("tissue_depth_mm", "mm", |t| t.tissue_depth_mm);
+        self.first::<Float32Type>("removed_mm3", "mm3", |t| t.removed_mm3);
+        self.first::<Float32Type>("spindle_rpm", "1/min", |t| t.spindle_rpm);
+        self.first::<Float32Type>("brain_distance_mm", "mm", |t| t.brain_distance_mm);
+        self.first::<Float32Type>("compute_us", "us", |t| t.compute_us);
+        self.first::<UInt8Type>("phase", "1", |t| t.phase);
+        self.first::<UInt8Type>("tool", "1", |t| t.tool);
+        for (name, mask) in FLAGS {
+            let is =
+                move |ticks: &[TickRecord]| ticks.iter().map(|tick| Some(tick.has(mask))).collect::<BooleanArray>();
+            let values: Values = Box::new(move |ticks, _| Arc::new(is(ticks)));
+            self.0.push(Column { field: field(name, "", DataType::Boolean, false), values });
+        }
+    }
+
+    fn second_hand(&mut self) {
+        self.second_vector("second_device_*_mm", "mm", |s| s.device.translation.to_array());
+        self.second_vector("second_device_q*", "1", |s| s.device.rotation.to_array());
+        self.second_vector("second_velocity_*_m_s", "m/s", |s| s.twist.linear.to_array());
+        self.second_vector("second_rotation_*_rad_ms", "rad/ms", |s| s.twist.angular.to_array());
+        self.second::<UInt32Type>("second_buttons", "bits", |s| s.buttons);
+        self.second_vector("second_proxy_*_mm", "mm", |s| s.proxy.translation.to_array());
+        self.second_vector("second_proxy_q*", "1", |s| s.proxy.rotation.to_array());
+        self.second_vector("second_force_*_n", "N", |s| s.wrench.force.to_array());
+        self.second_vector("second_torque_*_n_mm", "N mm", |s| s.wrench.torque.to_array());
+        self.second::<Float32Type>("second_depth_mm", "mm", |s| s.depth_mm);
+        self.second::<Float32Type>("second_tissue_depth_mm", "mm", |s| s.tissue_depth_mm);
+        for (name, mask) in
+            FLAGS.into_iter().filter(|(name, _)| ["clamped", "stale", "released", "lost"].contains(name))
+        {
+            let values: Values = Box::new(move |_, second| {
+                Arc::new(second.iter().map(|record| record.map(|record| record.has(mask))).collect::<BooleanArray>())
+            });
+            self.0.push(Column { field: field(&format!("second_{name}"), "", DataType::Boolean, true), values });
         }
     }
 }
+
+const AXES: [&str; 4] = ["x", "y", "z", "w"];
+const FLAGS: [(&str, u32); 9] = [
+    ("late", TickRecord::LATE),
+    ("held", TickRecord::HELD),
+    ("clamped", TickRecord::CLAMPED),
+    ("drilling", TickRecord::DRILLING),
+    ("stale", TickRecord::STALE),
+    ("released", TickRecord::RELEASED),
+    ("lost", TickRecord::LOST),
+    ("through", TickRecord::THROUGH),
+    ("undoing", TickRecord::UNDOING),
+];
 
 /// A field with its unit in the metadata; none for an empty unit.
 fn field(name: &str, unit: &str, kind: DataType, nullable: bool) -> Field {
@@ -184,10 +161,7 @@ pub fn schema(table: &str) -> SchemaRef {
     let real = |name, unit| field(name, unit, DataType::Float64, false);
     let yes = |name| field(name, "", DataType::Boolean, false);
     Arc::new(Schema::new(match table {
-        "ticks" => {
-            let of = |Column { name, unit, get }: &Column| field(name, unit, get.kind().0, get.kind().1);
-            TICK_COLUMNS.iter().map(of).collect::<Vec<_>>()
-        }
+        "ticks" => TICK_COLUMNS.iter().map(|column| column.field.clone()).collect::<Vec<_>>(),
         "events" => vec![whole("tick", "1"), real("time_ms", "ms"), text("kind", false), text("text", false)],
         "scores" => vec![text("name", false), real("value", ""), text("unit", false)],
         _ => vec![
@@ -216,7 +190,7 @@ pub fn schema(table: &str) -> SchemaRef {
 
 /// Rows of `ticks`; `second` is as long as `ticks`.
 pub fn tick_rows(ticks: &[TickRecord], second: &[Option<SecondRecord>]) -> Result<RecordBatch> {
-    let values = TICK_COLUMNS.iter().map(|column| column.get.values(ticks, second)).collect();
+    let values = TICK_COLUMNS.iter().map(|column| (column.values)(ticks, second)).collect();
     Ok(RecordBatch::try_new(schema("ticks"), values)?)
 }
 
@@ -235,8 +209,8 @@ pub fn properties(table: &str, source: &str) -> WriterProperties {
 fn of_ticks(properties: WriterPropertiesBuilder) -> WriterPropertiesBuilder {
     let properties = properties.set_dictionary_enabled(false);
     TICK_COLUMNS.iter().fold(properties, |properties, column| {
-        let path = column.name.as_str().into();
-        match column.get.kind().0 {
+        let path = column.field.name().as_str().into();
+        match column.field.data_type() {
             DataType::Float64 | DataType::Float32 => properties.set_column_encoding(path, Encoding::BYTE_STREAM_SPLIT),
             DataType::UInt64 => properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED),
             DataType::Boolean => properties,

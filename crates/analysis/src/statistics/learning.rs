@@ -44,7 +44,7 @@ pub fn fit_power_law(points: &[(f64, f64)]) -> Option<PowerLaw> {
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
     let middle = mean(&values);
     let total: f64 = values.iter().map(|value| (value - middle).powi(2)).sum();
-    if attempts.len() < 4 || !(total > 0.0) {
+    if attempts.len() < 4 || total.is_nan() || total <= 0.0 {
         return None;
     }
     let spacing = (RATES[1] / RATES[0]).powf(1.0 / STEPS as f64);

@@ -53,7 +53,7 @@ pub fn reliability(rows: &[Vec<f64>]) -> Option<Reliability> {
     };
     let freedom = (nf - 1.0) * (kf - 1.0);
     let error = rows.iter().zip(&row_means).map(residual).sum::<f64>() / freedom;
-    if !(between + error > 0.0) || error <= 0.0 {
+    if error.is_nan() || error <= 0.0 {
         return None;
     }
     let f = |share: f64, above: f64, below: f64| Some(FisherSnedecor::new(above, below).ok()?.inverse_cdf(share));

@@ -76,7 +76,7 @@ mod tests {
         let along = |t: f64| {
             let s = (t % 1000.0 / 600.0).min(1.0);
             let part = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
-            20.0 * if (t / 1000.0) as u64 % 2 == 0 { part } else { 1.0 - part }
+            20.0 * if ((t / 1000.0) as u64).is_multiple_of(2) { part } else { 1.0 - part }
         };
         let tremor = |t: f64| 0.03 * (t * 1e-3 * 9.0 * std::f64::consts::TAU).sin();
         let tip: Vec<[f32; 3]> = time_ms.iter().map(|t| [along(*t) as f32, tremor(*t) as f32, 0.0]).collect();

@@ -13,6 +13,6 @@ pub use analysis::analyse;
 pub use check::{Answers, answers, missing};
 pub use page::write;
 pub use plan::{Participant, Plan, plan, power_lines};
-pub use protocol::{Condition, Group, Hand, Measure, Order, Protocol, Question, Scale, Task};
-pub use results::{Attempt, Finding, Law, Outlier, Reliable, Results};
+pub use protocol::{Condition, Group, Hand, Measure, Order, Protocol, Question, Scale, Statistics, Task};
+pub use results::{Attempt, Finding, Law, Of, Outlier, Results};
 pub use runs::{Run, runs};

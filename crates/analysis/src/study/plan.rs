@@ -1,10 +1,11 @@
 //! Participants with their codes and orders, the blinding, and how many participants are needed.
 
-use super::protocol::{Order, Protocol};
-use crate::files::{shown, whole};
+use super::protocol::{Order, Protocol, Statistics};
+use crate::files::whole;
 use crate::statistics::{Design, participants_needed, power};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use fastrand::Rng;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -98,13 +99,10 @@ impl Plan {
         csv
     }
 
-    /// What is behind each letter, as CSV.
-    pub fn key_csv(&self, protocol: &Protocol) -> String {
-        let mut csv = "condition,name\n".to_owned();
-        for (at, condition) in self.key.iter().enumerate() {
-            _ = writeln!(csv, "{},{}", letter(at), protocol.conditions[*condition].name.replace(',', " "));
-        }
-        csv
+    /// Name of the condition behind each letter.
+    pub fn names(&self, protocol: &Protocol) -> BTreeMap<String, String> {
+        let name = |(at, condition): (usize, &usize)| (letter(at), protocol.conditions[*condition].name.clone());
+        self.key.iter().enumerate().map(name).collect()
     }
 
     /// Writes `participants.csv`, `consent.txt`, `answers.csv` to fill in and, with conditions, `key.csv`
@@ -119,11 +117,11 @@ impl Plan {
         if self.key.is_empty() {
             return Ok(());
         }
-        whole(&folder.join("key.csv"), self.key_csv(protocol).as_bytes())?;
+        let lines = self.names(protocol).into_iter().map(|(letter, name)| format!("{letter},{name}\n"));
+        whole(&folder.join("key.csv"), ("condition,name\n".to_owned() + &lines.collect::<String>()).as_bytes())?;
         for (at, condition) in self.key.iter().enumerate() {
-            let path = folder.join(format!("condition-{}.txt", letter(at)));
             let settings = protocol.conditions[*condition].set.join("\n") + "\n";
-            whole(&path, settings.as_bytes()).with_context(|| format!("cannot write {}", shown(&path)))?;
+            whole(&folder.join(format!("condition-{}.txt", letter(at))), settings.as_bytes())?;
         }
         Ok(())
     }
@@ -144,12 +142,11 @@ impl Plan {
 
 /// The power of the study as lines of text.
 pub fn power_lines(protocol: &Protocol) -> String {
-    let Protocol { effect, alpha, power: wanted, .. } = protocol;
+    let Statistics { effect, alpha, power: wanted, .. } = protocol.statistics;
     let mut lines = String::new();
     let mut line = |design, n: usize, what: &str, unit: &str| {
-        let reached = power(design, *effect, n, *alpha);
-        let needed =
-            participants_needed(design, *effect, *wanted, *alpha).map_or("over 100000".into(), |n| n.to_string());
+        let reached = power(design, effect, n, alpha);
+        let needed = participants_needed(design, effect, wanted, alpha).map_or("over 100000".into(), |n| n.to_string());
         _ = writeln!(
             lines,
             "{what}: {n} {unit} find an effect of {effect} standard deviations at {alpha} with power {reached:.3}; \

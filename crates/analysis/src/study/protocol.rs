@@ -19,18 +19,9 @@ pub struct Protocol {
     pub consent: String,
     /// Seed of the order, of the blinding and of what is drawn at random.
     pub seed: u64,
-    /// Level of significance, corrected over all comparisons.
-    #[serde(default = "alpha")]
-    pub alpha: f64,
-    /// Power that the number of participants is planned for.
-    #[serde(default = "wanted_power")]
-    pub power: f64,
-    /// Effect that matters, in standard deviations.
-    #[serde(default = "effect")]
-    pub effect: f64,
-    /// Draws of each permutation test and bootstrap.
-    #[serde(default = "draws")]
-    pub draws: usize,
+    /// Levels and draws of the statistics.
+    #[serde(default)]
+    pub statistics: Statistics,
     /// How the conditions, or else the tasks, are ordered.
     #[serde(default)]
     pub order: Order,
@@ -48,17 +39,24 @@ pub struct Protocol {
     pub questions: Vec<Question>,
 }
 
-fn alpha() -> f64 {
-    0.05
+/// Levels and draws of the statistics.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Statistics {
+    /// Level of significance, corrected over all comparisons: the chance of any false finding.
+    pub alpha: f64,
+    /// Power that the number of participants is planned for.
+    pub power: f64,
+    /// Effect that matters, in standard deviations.
+    pub effect: f64,
+    /// Draws of each permutation test and bootstrap.
+    pub draws: usize,
 }
-fn wanted_power() -> f64 {
-    0.8
-}
-fn effect() -> f64 {
-    0.8
-}
-fn draws() -> usize {
-    9999
+
+impl Default for Statistics {
+    fn default() -> Self {
+        Self { alpha: 0.01, power: 0.8, effect: 0.8, draws: 9999 }
+    }
 }
 
 /// How conditions or tasks are ordered.
@@ -210,12 +208,13 @@ impl Protocol {
         if let Some(task) = self.tasks.iter().find(|task| task.attempts == 0) {
             bail!("task {:?} has no attempts; give 1 or more", task.name);
         }
-        let shares = [("alpha", self.alpha), ("power", self.power)];
+        let Statistics { alpha, power, effect, draws } = self.statistics;
+        let shares = [("alpha", alpha), ("power", power)];
         if let Some((name, value)) = shares.iter().find(|(_, value)| !(*value > 0.0 && *value < 1.0)) {
-            bail!("{name} = {value} is not between 0 and 1; usual are alpha = 0.05 and power = 0.8");
+            bail!("{name} = {value} is not between 0 and 1; usual are alpha = 0.01 and power = 0.8");
         }
-        if !(self.effect > 0.0) || self.draws < 99 {
-            bail!("effect = {}, draws = {}; give an effect over 0 and at least 99 draws", self.effect, self.draws);
+        if effect.is_nan() || effect <= 0.0 || draws < 99 {
+            bail!("effect = {effect}, draws = {draws}; give an effect over 0 and at least 99 draws");
         }
         Ok(())
     }

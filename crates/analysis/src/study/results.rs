@@ -26,15 +26,22 @@ pub struct Finding {
     pub found: bool,
 }
 
-/// A mean over a group's participants at an attempt: a row of `learning.csv`.
+/// Something of a measure in a task, of a group or of all of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Attempt {
+pub struct Of<T> {
     /// Measure.
     pub measure: String,
     /// Task.
     pub task: String,
-    /// Group.
+    /// Group; empty for all.
     pub group: String,
+    /// What.
+    pub is: T,
+}
+
+/// A mean over participants at an attempt, in a row of `learning.csv`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Attempt {
     /// Attempt, from 1.
     pub attempt: usize,
     /// Mean over participants.
@@ -43,32 +50,13 @@ pub struct Attempt {
     pub standard_error: f64,
 }
 
-/// How a group learns: a row of `laws.csv`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+/// How participants learn, in a row of `laws.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Law {
-    /// Measure.
-    pub measure: String,
-    /// Task.
-    pub task: String,
-    /// Group.
-    pub group: String,
     /// Power law of the means.
     pub law: PowerLaw,
-    /// Lower end of the rate's 95 % interval over samples of participants.
-    pub rate_low: f64,
-    /// Upper end.
-    pub rate_high: f64,
-}
-
-/// How reliable one attempt is: a row of `reliability.csv`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Reliable {
-    /// Measure.
-    pub measure: String,
-    /// Task.
-    pub task: String,
-    /// The numbers.
-    pub reliability: Reliability,
+    /// 95 % interval of its rate over samples of participants.
+    pub rate: [f64; 2],
 }
 
 /// An unusual session, listed and not left out: a row of `outliers.csv`.
@@ -94,11 +82,11 @@ pub struct Results {
     /// Comparisons.
     pub findings: Vec<Finding>,
     /// Means by attempt; those of a measure and task follow each other, by group.
-    pub attempts: Vec<Attempt>,
+    pub attempts: Vec<Of<Attempt>>,
     /// Learning.
-    pub laws: Vec<Law>,
+    pub laws: Vec<Of<Law>>,
     /// Reliability.
-    pub reliability: Vec<Reliable>,
+    pub reliability: Vec<Of<Reliability>>,
     /// How well the measures tell the groups apart.
     pub classified: Option<Classified>,
     /// Group of each classified participant.

@@ -49,9 +49,8 @@ pub fn runs(protocol: &Protocol, tables: &Path) -> Result<(Vec<Run>, Vec<String>
     let (mut runs, mut others) = (Vec::<Run>::new(), Vec::new());
     for batch in &cases {
         let columns: Vec<Vec<Option<String>>> = (0..6).map(|at| texts(batch, at)).collect::<Result<_>>()?;
-        for row in 0..batch.num_rows() {
-            let [session, participant, task, condition, complete, simulated] =
-                std::array::from_fn(|at| columns[at][row].clone());
+        let rows = (0..batch.num_rows()).map(|row| std::array::from_fn(|at| columns[at][row].clone()));
+        for [session, participant, task, condition, complete, simulated] in rows {
             let (session, task) = (session.unwrap_or_default(), task.unwrap_or_default());
             let code = participant.unwrap_or_default();
             let Some(group) = protocol.group_of(&code).filter(|_| !code.is_empty()) else {

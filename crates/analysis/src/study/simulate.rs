@@ -115,9 +115,12 @@ fn session(protocol: &Protocol, folder: &Path, run: &Run, nth: usize, seed: u64)
         _ = writeln!(csv, "{part}{name},{value}");
     }
     whole(&folder.join("scores.csv"), csv.as_bytes())?;
-    // Who has more practice makes a stroke in less time.
+    // Who has more practice makes a stroke in less time; hands and sessions differ.
     let hand = protocol.groups[run.group].simulated;
-    let stroke_ms = 400.0 * hand.level * (1.0 + 0.3 * hand.gain * (run.attempt as f64).powf(-hand.rate));
+    let practice = 1.0 + 0.3 * hand.gain * (run.attempt as f64).powf(-hand.rate);
+    let mut own = Rng::with_seed(run.participant.bytes().fold(!protocol.seed, |h, b| h.rotate_left(9) ^ u64::from(b)));
+    let spread = hand.between * normal(&mut own) + 0.3 * hand.within * normal(&mut Rng::with_seed(!seed));
+    let stroke_ms = 400.0 * hand.level * practice * spread.exp();
     write_recording(&folder.join("session.mcap"), seed, SHORT, stroke_ms, false)
 }
 
@@ -186,7 +189,7 @@ fn tick(number: u64, time_ms: f64, stroke_ms: f64, rng: &mut Rng) -> TickRecord 
     let period = stroke_ms + PAUSE_MS;
     let s = (time_ms % period / stroke_ms).min(1.0);
     let part = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
-    let along = STROKE_MM * if (time_ms / period) as u64 % 2 == 0 { part } else { 1.0 - part };
+    let along = STROKE_MM * if ((time_ms / period) as u64).is_multiple_of(2) { part } else { 1.0 - part };
     let tremor = 0.02 * (1e-3 * time_ms * 9.0 * TAU).sin();
     let mut noise = |size: f32| size * (rng.f32() - 0.5);
     let depth_mm = 0.3 + noise(0.1);
