@@ -18,7 +18,7 @@ use datafusion::parquet::file::metadata::KeyValue;
 use datafusion::parquet::file::reader::{FileReader, SerializedFileReader};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{self, File, TryLockError};
 use std::io::Read;
@@ -80,6 +80,7 @@ struct Done {
 /// Exports every recording in a folder and below, on all cores. A recording that fails is listed
 /// and does not stop the others. An error where nothing can be read or `out` cannot be written.
 pub fn export(runs: &Path, out: &Path) -> Result<Exported> {
+    let paths = recordings(runs)?;
     let failed = || format!("cannot write into {}; choose a folder that you may write to", shown(out));
     fs::create_dir_all(out).with_context(failed)?;
     let lock = File::create(out.join(".lock")).with_context(failed)?;
@@ -88,10 +89,9 @@ pub fn export(runs: &Path, out: &Path) -> Result<Exported> {
         Err(TryLockError::WouldBlock) => bail!("another export writes into {}; wait for its end", shown(out)),
         Err(TryLockError::Error(fault)) => return Err(fault).with_context(failed),
     }
-    let paths = recordings(runs)?;
     remove_unfinished(out)?;
     let mut exported = Exported::default();
-    let sources = distinct(paths.into_iter().map(|path| source(&path).map_err(|fault| (path, fault))), &mut exported);
+    let sources = distinct(paths, &mut exported);
     let done: Vec<_> = sources.par_iter().map(|source| (source, session(source, out))).collect();
     for (source, done) in done {
         match done {
@@ -139,35 +139,28 @@ fn source(path: &Path) -> Result<Source> {
 }
 
 /// One source for each session: of copies, the longest.
-fn distinct(
-    sources: impl Iterator<Item = Result<Source, (PathBuf, anyhow::Error)>>,
-    exported: &mut Exported,
-) -> Vec<Source> {
-    let (mut found, mut by_id) = (Vec::<Source>::new(), HashMap::new());
-    for source in sources {
-        let source = match source {
+fn distinct(paths: Vec<PathBuf>, exported: &mut Exported) -> Vec<Source> {
+    let mut found = BTreeMap::<String, Source>::new();
+    for path in paths {
+        let source = match source(&path) {
             Ok(source) => source,
-            Err((path, fault)) => {
+            Err(fault) => {
                 exported.failed.push(format!("{}: {fault:#}", shown(&path)));
                 continue;
             }
         };
-        let at = *by_id.entry(source.id.clone()).or_insert(found.len());
-        let Some(other) = found.get_mut(at) else {
-            found.push(source);
+        let Some(other) = found.remove(&source.id) else {
+            found.insert(source.id.clone(), source);
             continue;
         };
-        let [kept, left] = if source.bytes > other.bytes { [&source, &*other] } else { [&*other, &source] };
-        exported.warnings.push(format!(
-            "{} is the session of {} again, and not longer: left out; remove one of them",
-            shown(&left.path),
-            shown(&kept.path)
-        ));
-        if source.bytes > other.bytes {
-            *other = source;
-        }
+        let [kept, left] = if source.bytes > other.bytes { [source, other] } else { [other, source] };
+        let [place, again] = [&kept, &left].map(|source| shown(&source.path));
+        exported
+            .warnings
+            .push(format!("{again} is the session of {place}, and not longer: left out; remove one of them"));
+        found.insert(kept.id.clone(), kept);
     }
-    found
+    found.into_values().collect()
 }
 
 /// Exports one session; nothing of it is there if that fails.
@@ -188,9 +181,10 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
         warnings.push("its person may be a name and was left out; give codes such as --person N07".into());
     }
     let file = |table: &str| folder.path().join(format!("{table}.parquet"));
-    let mut sink = Sink::create(&file("ticks"), &source.stamp)?;
+    let mut sink = Sink { writer: create(&file("ticks"), "ticks", &source.stamp)?, seen: Seen::default() };
     let streamed = trepan_link::stream(&source.path, |chunk| sink.add(chunk))?;
-    let late = sink.finish()?;
+    let seen = sink.finish()?;
+    let late = seen.of_second[0] - seen.of_second[1];
     if let Some(losses) = streamed.losses() {
         let remedy = "what is whole was exported; fetch the file again for the rest";
         warnings.push(format!("{losses}; {remedy}"));
@@ -198,11 +192,11 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
     if late > 0 {
         warnings.push(format!("{late} records of the second hand came {LAG} ticks late and are null; tell the makers"));
     }
-    let program = format!("{} {}", sink.header.app, sink.header.version);
+    let program = format!("{} {}", seen.header.app, seen.header.version);
     let write = |table, rows| write_one(&file(table), table, &source.stamp, &program, rows);
-    write("events", events(&sink.events)?)?;
+    write("events", events(&seen.events)?)?;
     write("scores", score_rows(&scores.unwrap_or_default())?)?;
-    write("cases", case_row(&sink, &facts, &streamed)?)?;
+    write("cases", case_row(&seen, &facts, &streamed)?)?;
     for table in TABLES {
         let place = partition(table);
         if table == TABLES[0] {
@@ -217,7 +211,7 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
         fs::create_dir_all(&place).with_context(failed)?;
         fs::rename(file(table), place.join(PART)).with_context(failed)?;
     }
-    Ok(Done { written: true, ticks: sink.ticks, seconds: sink.seconds(), program, warnings })
+    Ok(Done { written: true, ticks: seen.ticks, seconds: seen.seconds(), program, warnings })
 }
 
 /// Program and version if the session was exported from the same files by this version of the
@@ -256,11 +250,16 @@ fn write_one(path: &Path, table: &str, stamp: &str, program: &str, rows: RecordB
 /// The ticks of a session on their way to a file, and what else the other tables need.
 struct Sink {
     writer: ArrowWriter<File>,
+    seen: Seen,
+}
+
+/// What was seen of a session.
+#[derive(Default)]
+struct Seen {
     waiting: Vec<TickRecord>,
     second: Vec<SecondRecord>,
-    has_second: bool,
-    paired: u64,
-    seconds_seen: u64,
+    /// Records of the second hand, and those that found their tick.
+    of_second: [u64; 2],
     header: SessionHeader,
     events: Vec<EventRecord>,
     ticks: u64,
@@ -269,30 +268,14 @@ struct Sink {
 }
 
 impl Sink {
-    fn create(path: &Path, stamp: &str) -> Result<Self> {
-        Ok(Self {
-            writer: create(path, "ticks", stamp)?,
-            waiting: Vec::with_capacity(2 * (BATCH + LAG)),
-            second: Vec::new(),
-            has_second: false,
-            paired: 0,
-            seconds_seen: 0,
-            header: SessionHeader::default(),
-            events: Vec::new(),
-            ticks: 0,
-            first_ms: None,
-            last_ms: 0.0,
-        })
-    }
-
     fn add(&mut self, chunk: &Recording) -> Result<()> {
-        self.header.clone_from(&chunk.header);
-        self.events.extend(chunk.events.iter().cloned());
-        self.waiting.extend_from_slice(&chunk.ticks);
-        self.second.extend_from_slice(&chunk.second);
-        self.has_second |= !chunk.second.is_empty();
-        self.seconds_seen += chunk.second.len() as u64;
-        while self.waiting.len() >= BATCH + LAG {
+        let Seen { waiting, second, of_second, header, events, .. } = &mut self.seen;
+        header.clone_from(&chunk.header);
+        events.extend(chunk.events.iter().cloned());
+        waiting.extend_from_slice(&chunk.ticks);
+        second.extend_from_slice(&chunk.second);
+        of_second[0] += chunk.second.len() as u64;
+        while self.seen.waiting.len() >= BATCH + LAG {
             self.write(BATCH)?;
         }
         Ok(())
@@ -300,33 +283,36 @@ impl Sink {
 
     /// Writes the first ticks that wait, each with the second hand's record of its number.
     fn write(&mut self, count: usize) -> Result<()> {
-        let ticks = &self.waiting[..count];
+        let seen = &mut self.seen;
+        let ticks = &seen.waiting[..count];
         let (mut pairs, mut used) = (vec![None; count], 0);
-        if let Some(last) = ticks.last().filter(|_| self.has_second) {
-            used = self.second.partition_point(|second| second.tick <= last.tick);
-            let mut second = self.second[..used].iter().peekable();
+        if let Some(last) = ticks.last() {
+            used = seen.second.partition_point(|second| second.tick <= last.tick);
+            let mut second = seen.second[..used].iter().peekable();
             for (tick, pair) in ticks.iter().zip(&mut pairs) {
                 while second.next_if(|second| second.tick < tick.tick).is_some() {}
                 *pair = second.next_if(|second| second.tick == tick.tick).copied();
             }
+            seen.first_ms = seen.first_ms.or(ticks.first().map(|tick| tick.time_ms));
+            seen.last_ms = last.time_ms;
         }
-        self.paired += pairs.iter().flatten().count() as u64;
+        seen.of_second[1] += pairs.iter().flatten().count() as u64;
         self.writer.write(&tables::tick_rows(ticks, &pairs)?)?;
-        self.ticks += count as u64;
-        self.first_ms = self.first_ms.or(ticks.first().map(|tick| tick.time_ms));
-        self.last_ms = ticks.last().map_or(self.last_ms, |tick| tick.time_ms);
-        self.waiting.drain(..count);
-        self.second.drain(..used);
+        seen.ticks += count as u64;
+        seen.waiting.drain(..count);
+        seen.second.drain(..used);
         Ok(())
     }
 
-    /// Writes the rest; the number of the second hand's records without a tick.
-    fn finish(&mut self) -> Result<u64> {
-        self.write(self.waiting.len())?;
-        self.writer.finish()?;
-        Ok(self.seconds_seen - self.paired)
+    /// Writes the rest.
+    fn finish(mut self) -> Result<Seen> {
+        self.write(self.seen.waiting.len())?;
+        self.writer.close()?;
+        Ok(self.seen)
     }
+}
 
+impl Seen {
     /// Session time from the first tick to the last, s.
     fn seconds(&self) -> f64 {
         1e-3 * (self.last_ms - self.first_ms.unwrap_or(self.last_ms))
@@ -352,8 +338,8 @@ fn score_rows(scores: &[Score]) -> Result<RecordBatch> {
     Ok(RecordBatch::try_new(tables::schema("scores"), values)?)
 }
 
-fn case_row(sink: &Sink, facts: &Facts, streamed: &Streamed) -> Result<RecordBatch> {
-    let header = &sink.header;
+fn case_row(seen: &Seen, facts: &Facts, streamed: &Streamed) -> Result<RecordBatch> {
+    let header = &seen.header;
     let config = |key: &str| header.config.get(key).cloned();
     let clean = |text: &Option<String>| text.as_deref().map(without_paths);
     let own = |text: Option<&str>| text.map(str::to_owned);
@@ -375,10 +361,10 @@ fn case_row(sink: &Sink, facts: &Facts, streamed: &Streamed) -> Result<RecordBat
         text(config("ingredients.rigid")),
         text(facts.date.clone()),
         whole(header.seed),
-        Arc::new(Float64Array::from(vec![sink.seconds()])),
-        whole(sink.ticks),
+        Arc::new(Float64Array::from(vec![seen.seconds()])),
+        whole(seen.ticks),
         whole(streamed.missing),
-        yes(sink.has_second),
+        yes(seen.of_second[0] > 0),
         yes(losses.is_none()),
         yes(facts.simulated),
         text(losses),

@@ -218,23 +218,3 @@ fn of_ticks(properties: WriterPropertiesBuilder) -> WriterPropertiesBuilder {
         }
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_ends_with_its_unit() {
-        for table in TABLES {
-            for field in schema(table).fields() {
-                let unit = field.metadata().get("unit").map_or("", String::as_str);
-                let end = match unit {
-                    "" | "1" | "bits" => continue,
-                    "1/min" => "_rpm".to_owned(),
-                    unit => format!("_{}", unit.replace([' ', '/'], "_").to_lowercase()),
-                };
-                assert!(field.name().ends_with(&end), "{} is in {unit}", field.name());
-            }
-        }
-    }
-}

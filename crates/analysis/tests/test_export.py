@@ -49,10 +49,14 @@ def test_a_second_run_writes_nothing_and_new_scores_are_taken(runs: Path) -> Non
     assert "3 sessions exported, 0 were there" in export(runs)[0]
     assert cell(runs, "select count(*) from @ticks") == 4500 and cell(runs, "select count(*) from @events") == 18
     assert "0 sessions exported, 3 were there" in export(runs)[0]
-    (runs / "E01-001" / "scores.csv").write_text("name,value\nscores.plunge_mm,10.25\n")
+    scores = {"plunge_mm": "mm", "tissue_impulse_n_s": "N s", "tools.burr.mean_n": "N", "times_through": "", "drilling_s": "s"}
+    lines = [f"{name if '.' in name else 'scores.' + name},10.25" for name in scores]
+    (runs / "E01-001" / "scores.csv").write_text("\n".join(["name,value", *lines]))
     assert "1 sessions exported, 2 were there" in export(runs)[0]
     assert cell(runs, "select value from @scores where name = 'plunge_mm' order by value desc") == 10.25
     assert cell(runs, "select count(distinct session) from @cases") == 3
+    units = cell(runs, "select map_from_entries(list((name, unit))) from @scores where value = 10.25")
+    assert units == scores
 
 
 def test_a_cut_recording_gives_its_whole_part_and_is_replaced(runs: Path) -> None:
@@ -75,7 +79,7 @@ def test_what_cannot_be_read_stops_nothing_and_leaves_nothing(runs: Path) -> Non
     (runs / "N01-002" / "session.mcap").write_bytes(b"nothing")
     (runs / "E01-001" / "summary.json").write_text("{")
     _, told = export(runs, 1)
-    assert "again" in told and "is not a recording" in told and "is no summary" in told and "2 recordings" in told
+    assert "left out" in told and "is not a recording" in told and "is no summary" in told and "2 recordings" in told
     left = runs.with_name("tables") / "ticks" / "session=0123456789abcdef"
     left.mkdir()
     (runs.with_name("tables") / ".part-x").mkdir()

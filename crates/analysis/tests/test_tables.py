@@ -44,6 +44,11 @@ def test_fields_have_units_and_the_sessions_say_that_they_are_simulated(study: P
     part = next((study / "results" / "tables" / "ticks").glob("*/part.parquet"))
     schema = pq.read_schema(part)
     assert schema.field("second_force_x_n").metadata[b"unit"] == b"N"
+    for field in schema:
+        unit = (field.metadata or {}).get(b"unit", b"").decode()
+        if unit not in ("", "1", "bits"):
+            ending = "rpm" if unit == "1/min" else unit.replace(" ", "_").replace("/", "_").lower()
+            assert field.name.endswith("_" + ending), f"{field.name} is in {unit}"
     assert pq.read_metadata(part).metadata[b"trepan.tables"] == b"1"
     cases = pd.read_parquet(study / "results" / "tables" / "cases")
     assert cases.simulated.all() and cases.complete.all() and cases.participant.nunique() == 40

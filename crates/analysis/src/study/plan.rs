@@ -1,6 +1,6 @@
 //! Participants with their codes and orders, the blinding, and how many participants are needed.
 
-use super::protocol::{Order, Protocol, Statistics};
+use super::protocol::{Order, Protocol, Question, Statistics};
 use crate::files::whole;
 use crate::statistics::{Design, participants_needed, power};
 use anyhow::Result;
@@ -112,7 +112,7 @@ impl Plan {
         whole(&folder.join("consent.txt"), protocol.consent.trim_start().as_bytes())?;
         let answers = folder.join("answers.csv");
         if !answers.exists() && !protocol.questions.is_empty() {
-            whole(&answers, self.blank_answers(protocol).as_bytes())?;
+            whole(&answers, self.answers_csv(protocol, |_, _| String::new()).as_bytes())?;
         }
         if self.key.is_empty() {
             return Ok(());
@@ -126,13 +126,15 @@ impl Plan {
         Ok(())
     }
 
-    fn blank_answers(&self, protocol: &Protocol) -> String {
+    /// `answers.csv`, with an answer of each participant's code to each question.
+    pub fn answers_csv(&self, protocol: &Protocol, mut answer: impl FnMut(&str, &Question) -> String) -> String {
         let mut csv = "participant,condition,item,value\n".to_owned();
         for participant in &self.participants {
             let conditions = if self.key.is_empty() { vec![String::new()] } else { participant.order.clone() };
             for condition in conditions {
                 for question in &protocol.questions {
-                    _ = writeln!(csv, "{},{condition},{},", participant.code, question.item);
+                    let (code, value) = (&participant.code, answer(&participant.code, question));
+                    _ = writeln!(csv, "{code},{condition},{},{value}", question.item);
                 }
             }
         }

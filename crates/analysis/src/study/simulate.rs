@@ -14,7 +14,6 @@ use anyhow::{Context, Result, bail};
 use fastrand::Rng;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -83,21 +82,22 @@ pub fn simulate(protocol: &Protocol, out: &Path, seed: u64) -> Result<usize> {
     if out.exists() {
         bail!("{} is there already; give a new folder, so that real and simulated runs do not mix", shown(out));
     }
-    let mut began = BTreeMap::<String, usize>::new();
-    let runs: Vec<(Run, usize)> = draw(protocol, seed)
-        .into_iter()
-        .map(|run| {
-            let count = began.entry(run.participant.clone()).or_default();
-            *count += 1;
-            (run, *count)
-        })
-        .collect();
+    let runs = draw(protocol, seed);
+    let of_each = runs.chunk_by(|a, b| a.participant == b.participant);
+    let runs: Vec<(&Run, usize)> = of_each.flat_map(|runs| runs.iter().zip(1..)).collect();
     runs.par_iter().enumerate().try_for_each(|(number, (run, nth))| {
         let folder = out.join(format!("{}-{nth:03}", run.participant));
         session(protocol, &folder, run, *nth, seed.wrapping_mul(1_000_003) + number as u64)
     })?;
     if !protocol.questions.is_empty() {
-        whole(&out.join("answers.csv"), answers(protocol, seed).as_bytes())?;
+        let mut rng = Rng::with_seed(!seed);
+        let answers = plan(protocol).answers_csv(protocol, |code, question| {
+            let [low, high] = question.scale.range();
+            let own = normal(&mut of_code(code, seed));
+            let share = 0.5 + 0.1 * own + 0.1 * normal(&mut rng);
+            (low + (high - low) * share.clamp(0.0, 1.0)).round().to_string()
+        });
+        whole(&out.join("answers.csv"), answers.as_bytes())?;
     }
     Ok(runs.len())
 }
@@ -118,28 +118,15 @@ fn session(protocol: &Protocol, folder: &Path, run: &Run, nth: usize, seed: u64)
     // Who has more practice makes a stroke in less time; hands and sessions differ.
     let hand = protocol.groups[run.group].simulated;
     let practice = 1.0 + 0.3 * hand.gain * (run.attempt as f64).powf(-hand.rate);
-    let mut own = Rng::with_seed(run.participant.bytes().fold(!protocol.seed, |h, b| h.rotate_left(9) ^ u64::from(b)));
+    let mut own = of_code(&run.participant, protocol.seed);
     let spread = hand.between * normal(&mut own) + 0.3 * hand.within * normal(&mut Rng::with_seed(!seed));
     let stroke_ms = 400.0 * hand.level * practice * spread.exp();
     write_recording(&folder.join("session.mcap"), seed, SHORT, stroke_ms, false)
 }
 
-fn answers(protocol: &Protocol, seed: u64) -> String {
-    let mut rng = Rng::with_seed(!seed);
-    let mut csv = "participant,condition,item,value\n".to_owned();
-    for participant in plan(protocol).participants {
-        let own = normal(&mut rng);
-        let conditions = if protocol.conditions.is_empty() { vec![String::new()] } else { participant.order };
-        for condition in conditions {
-            for question in &protocol.questions {
-                let [low, high] = question.scale.range();
-                let share = 0.5 + 0.1 * own + 0.1 * normal(&mut rng);
-                let value = (low + (high - low) * share.clamp(0.0, 1.0)).round();
-                _ = writeln!(csv, "{},{condition},{},{value}", participant.code, question.item);
-            }
-        }
-    }
-    csv
+/// Draws that are the participant's own.
+fn of_code(code: &str, seed: u64) -> Rng {
+    Rng::with_seed(code.bytes().fold(!seed, |hash, byte| hash.rotate_left(9) ^ u64::from(byte)))
 }
 
 /// Writes a recording of made motion: `length` in s and rate in Hz, strokes of `stroke_ms`, and a
