@@ -29,7 +29,8 @@ use trepan_link::{Recording, Streamed};
 
 /// Ticks that are encoded at once; numerical, it bounds memory.
 const BATCH: usize = 8192;
-/// Ticks that are held back for a record of the second hand that comes later in the file; numerical.
+/// Ticks that are held back for a record of the second hand that comes later in the file;
+/// numerical.
 const LAG: usize = 4096;
 /// Bytes of a recording's beginning that its ID is made of; numerical.
 const HEAD_BYTES: u64 = 64 * 1024;
@@ -181,10 +182,10 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
         warnings.push("its person may be a name and was left out; give codes such as --person N07".into());
     }
     let file = |table: &str| folder.path().join(format!("{table}.parquet"));
-    let mut sink = Sink { writer: create(&file("ticks"), "ticks", &source.stamp)?, seen: Seen::default() };
+    let mut sink = Sink { writer: create(&file("ticks"), "ticks", &source.stamp)?, session: Session::default() };
     let streamed = trepan_link::stream(&source.path, |chunk| sink.add(chunk))?;
-    let seen = sink.finish()?;
-    let late = seen.of_second[0] - seen.of_second[1];
+    let session = sink.finish()?;
+    let late = session.of_second[0] - session.of_second[1];
     if let Some(losses) = streamed.losses() {
         let remedy = "what is whole was exported; fetch the file again for the rest";
         warnings.push(format!("{losses}; {remedy}"));
@@ -192,15 +193,16 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
     if late > 0 {
         warnings.push(format!("{late} records of the second hand came {LAG} ticks late and are null; tell the makers"));
     }
-    let program = format!("{} {}", seen.header.app, seen.header.version);
+    let program = format!("{} {}", session.header.app, session.header.version);
     let write = |table, rows| write_one(&file(table), table, &source.stamp, &program, rows);
-    write("events", events(&seen.events)?)?;
+    write("events", events(&session.events)?)?;
     write("scores", score_rows(&scores.unwrap_or_default())?)?;
-    write("cases", case_row(&seen, &facts, &streamed)?)?;
+    write("cases", case_row(&session, &facts, &streamed)?)?;
     for table in TABLES {
         let place = partition(table);
         if table == TABLES[0] {
-            // From here the old session is gone, if there was one: `cases` first, as it says what is there.
+            // From here the old session is gone, if there was one: `cases` first, as it says what
+            // is there.
             for table in ["cases", "ticks", "events", "scores"] {
                 let old = partition(table);
                 if old.exists() {
@@ -211,7 +213,7 @@ fn session(source: &Source, out: &Path) -> Result<Done> {
         fs::create_dir_all(&place).with_context(failed)?;
         fs::rename(file(table), place.join(PART)).with_context(failed)?;
     }
-    Ok(Done { written: true, ticks: seen.ticks, seconds: seen.seconds(), program, warnings })
+    Ok(Done { written: true, ticks: session.ticks, seconds: session.seconds(), program, warnings })
 }
 
 /// Program and version if the session was exported from the same files by this version of the
@@ -250,12 +252,12 @@ fn write_one(path: &Path, table: &str, stamp: &str, program: &str, rows: RecordB
 /// The ticks of a session on their way to a file, and what else the other tables need.
 struct Sink {
     writer: ArrowWriter<File>,
-    seen: Seen,
+    session: Session,
 }
 
-/// What was seen of a session.
+/// What was read of a session.
 #[derive(Default)]
-struct Seen {
+struct Session {
     waiting: Vec<TickRecord>,
     second: Vec<SecondRecord>,
     /// Records of the second hand, and those that found their tick.
@@ -269,13 +271,13 @@ struct Seen {
 
 impl Sink {
     fn add(&mut self, chunk: &Recording) -> Result<()> {
-        let Seen { waiting, second, of_second, header, events, .. } = &mut self.seen;
+        let Session { waiting, second, of_second, header, events, .. } = &mut self.session;
         header.clone_from(&chunk.header);
         events.extend(chunk.events.iter().cloned());
         waiting.extend_from_slice(&chunk.ticks);
         second.extend_from_slice(&chunk.second);
         of_second[0] += chunk.second.len() as u64;
-        while self.seen.waiting.len() >= BATCH + LAG {
+        while self.session.waiting.len() >= BATCH + LAG {
             self.write(BATCH)?;
         }
         Ok(())
@@ -283,36 +285,36 @@ impl Sink {
 
     /// Writes the first ticks that wait, each with the second hand's record of its number.
     fn write(&mut self, count: usize) -> Result<()> {
-        let seen = &mut self.seen;
-        let ticks = &seen.waiting[..count];
+        let session = &mut self.session;
+        let ticks = &session.waiting[..count];
         let (mut pairs, mut used) = (vec![None; count], 0);
         if let Some(last) = ticks.last() {
-            used = seen.second.partition_point(|second| second.tick <= last.tick);
-            let mut second = seen.second[..used].iter().peekable();
+            used = session.second.partition_point(|second| second.tick <= last.tick);
+            let mut second = session.second[..used].iter().peekable();
             for (tick, pair) in ticks.iter().zip(&mut pairs) {
                 while second.next_if(|second| second.tick < tick.tick).is_some() {}
                 *pair = second.next_if(|second| second.tick == tick.tick).copied();
             }
-            seen.first_ms = seen.first_ms.or(ticks.first().map(|tick| tick.time_ms));
-            seen.last_ms = last.time_ms;
+            session.first_ms = session.first_ms.or(ticks.first().map(|tick| tick.time_ms));
+            session.last_ms = last.time_ms;
         }
-        seen.of_second[1] += pairs.iter().flatten().count() as u64;
+        session.of_second[1] += pairs.iter().flatten().count() as u64;
         self.writer.write(&tables::tick_rows(ticks, &pairs)?)?;
-        seen.ticks += count as u64;
-        seen.waiting.drain(..count);
-        seen.second.drain(..used);
+        session.ticks += count as u64;
+        session.waiting.drain(..count);
+        session.second.drain(..used);
         Ok(())
     }
 
     /// Writes the rest.
-    fn finish(mut self) -> Result<Seen> {
-        self.write(self.seen.waiting.len())?;
+    fn finish(mut self) -> Result<Session> {
+        self.write(self.session.waiting.len())?;
         self.writer.close()?;
-        Ok(self.seen)
+        Ok(self.session)
     }
 }
 
-impl Seen {
+impl Session {
     /// Session time from the first tick to the last, s.
     fn seconds(&self) -> f64 {
         1e-3 * (self.last_ms - self.first_ms.unwrap_or(self.last_ms))
@@ -338,8 +340,8 @@ fn score_rows(scores: &[Score]) -> Result<RecordBatch> {
     Ok(RecordBatch::try_new(tables::schema("scores"), values)?)
 }
 
-fn case_row(seen: &Seen, facts: &Facts, streamed: &Streamed) -> Result<RecordBatch> {
-    let header = &seen.header;
+fn case_row(session: &Session, facts: &Facts, streamed: &Streamed) -> Result<RecordBatch> {
+    let header = &session.header;
     let config = |key: &str| header.config.get(key).cloned();
     let clean = |text: &Option<String>| text.as_deref().map(without_paths);
     let own = |text: Option<&str>| text.map(str::to_owned);
@@ -361,10 +363,10 @@ fn case_row(seen: &Seen, facts: &Facts, streamed: &Streamed) -> Result<RecordBat
         text(config("ingredients.rigid")),
         text(facts.date.clone()),
         whole(header.seed),
-        Arc::new(Float64Array::from(vec![seen.seconds()])),
-        whole(seen.ticks),
+        Arc::new(Float64Array::from(vec![session.seconds()])),
+        whole(session.ticks),
         whole(streamed.missing),
-        yes(seen.of_second[0] > 0),
+        yes(session.of_second[0] > 0),
         yes(losses.is_none()),
         yes(facts.simulated),
         text(losses),

@@ -4,7 +4,6 @@ use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::Instant;
 use trepan_analysis::export::{self, Exported};
 use trepan_analysis::files;
@@ -29,8 +28,8 @@ enum Command {
     /// Write recordings as Parquet tables ticks, events, scores and cases
     ///
     /// A folder tables/TABLE/session=ID for each session, as DuckDB, Polars, pandas and Spark read
-    /// them. Sessions that are there are left as they are. No name, path or free text of a person goes
-    /// into them.
+    /// them. Sessions that are there are left as they are. No name, path or free text of a person
+    /// goes into them.
     Export {
         /// Folder of sessions, or one recording (*.mcap)
         runs: PathBuf,
@@ -42,7 +41,8 @@ enum Command {
     Query {
         /// Folder that `export` wrote, or a folder of sessions, which is exported first
         runs: PathBuf,
-        /// The query, over the tables ticks, events, scores and cases; `describe ticks` lists columns
+        /// The query, over the tables ticks, events, scores and cases; `describe ticks` lists
+        /// columns
         #[arg(long)]
         sql: String,
         /// Write the rows to this file instead of printing them
@@ -53,8 +53,8 @@ enum Command {
     Plan {
         /// Protocol of the study (TOML); protocols/ of this crate has two
         protocol: PathBuf,
-        /// Also write participants.csv, consent.txt, answers.csv to fill in, and of blinded conditions
-        /// key.csv and condition-LETTER.txt for `--set @FILE`
+        /// Also write participants.csv, consent.txt, answers.csv to fill in, and of blinded
+        /// conditions key.csv and condition-LETTER.txt for `--set @FILE`
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -91,18 +91,8 @@ enum Command {
     },
 }
 
-fn main() -> ExitCode {
-    match run(&Arguments::parse().command) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(fault) => {
-            eprintln!("error: {fault:#}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn run(command: &Command) -> Result<()> {
-    match command {
+fn main() -> Result<()> {
+    match &Arguments::parse().command {
         Command::Export { runs, parquet } => export_tables(runs, parquet),
         Command::Query { runs, sql, csv } => run_query(runs, sql, csv.as_deref()),
         Command::Plan { protocol, out } => plan(protocol, out.as_deref()),

@@ -1,8 +1,8 @@
 //! SQL over the tables, on DataFusion.
 //!
 //! # Practice
-//! Tables `ticks`, `events`, `scores` and `cases`, each with the column `session`, by which they are
-//! joined. Only queries are taken: nothing can be written or dropped.
+//! Tables `ticks`, `events`, `scores` and `cases`, each with the column `session`, by which they
+//! are joined. Only queries are taken: nothing can be written or dropped.
 
 use crate::export;
 use crate::files::shown;
@@ -38,8 +38,8 @@ pub struct Database {
 }
 
 impl Database {
-    /// Opens a folder that [`export`](export::export) wrote, or exports a folder of recordings into a
-    /// temporary one first.
+    /// Opens a folder that [`export`](export::export) wrote, or exports a folder of recordings into
+    /// a temporary one first.
     pub fn open(runs: &Path) -> Result<Self> {
         let runtime = Runtime::new().context("cannot start threads; close programs")?;
         if is_tables(runs) {
@@ -56,8 +56,8 @@ impl Database {
         Ok(Self { runtime, context, exported: Some(exported), _folder: Some(folder) })
     }
 
-    /// Calls `each` with the rows of a query, batch by batch, until it returns `false`; the schema is
-    /// that of the first, which may be empty.
+    /// Calls `each` with the rows of a query, batch by batch, until it returns `false`. The first
+    /// batch is empty, for the schema.
     fn each(&self, sql: &str, mut each: impl FnMut(RecordBatch) -> Result<bool>) -> Result<()> {
         self.runtime.block_on(async {
             let mut rows = self.stream(sql).await?;

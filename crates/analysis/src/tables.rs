@@ -1,8 +1,9 @@
 //! Columns of the Parquet tables `ticks`, `events`, `scores` and `cases`, with their units.
 //!
 //! # Practice
-//! Each field's metadata has its `unit`, and a column's name ends with it. Vectors are three columns,
-//! quaternions four. Columns of the second hand begin with `second_` and are null without it.
+//! Each field's metadata has its `unit`, and a column's name ends with it. Vectors are three
+//! columns, quaternions four. Columns of the second hand begin with `second_` and are null without
+//! it.
 
 use anyhow::Result;
 use datafusion::arrow::array::{ArrayRef, BooleanArray, PrimitiveArray, RecordBatch};

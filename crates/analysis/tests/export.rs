@@ -1,4 +1,5 @@
-//! What `tests/test_export.py` cannot make: recordings of other programs and orders, and faults of SQL.
+//! What `tests/test_export.py` cannot make: recordings of other programs and orders, and faults of
+//! SQL.
 
 use anyhow::Result;
 use std::path::Path;

@@ -73,18 +73,22 @@ def test_reliability(study: Path, measure: str) -> None:
 
 
 def test_learning(study: Path) -> None:
-    table = pd.read_csv(study / "results" / "learning.csv")
-    for _, of in table[table.measure != "strokes.peak_mm_s"].groupby(["measure", "group"]):
-        def law(n: np.ndarray, floor: float, gain: float, rate: float) -> np.ndarray:
-            return floor + gain * n**-rate
+    means = pd.read_csv(study / "results" / "learning.csv").groupby(["measure", "group"])
+    laws = pd.read_csv(study / "results" / "laws.csv")
 
-        first = of.iloc[0]
+    def law(n: np.ndarray, floor: float, gain: float, rate: float) -> np.ndarray:
+        return floor + gain * n**-rate
+
+    assert len(laws) == 8
+    for _, ours in laws.iterrows():
+        of = means.get_group((ours.measure, ours.group))
+        n, y = of["attempt"].to_numpy(float), of["mean"].to_numpy()
         bounds = ([-np.inf, -np.inf, 0.02], [np.inf, np.inf, 4.0])
-        start = [of["mean"].min(), np.ptp(of["mean"]), 0.7]
-        fitted, _ = optimize.curve_fit(law, of.attempt, of["mean"], p0=start, bounds=bounds, max_nfev=100_000)
-        left = ((law(of.attempt, *fitted) - of["mean"]) ** 2).sum()
-        ours = ((law(of.attempt, first.floor, first.gain, first.rate) - of["mean"]) ** 2).sum()
-        assert ours <= left * (1 + 1e-6)
+        start = [y[-1], y[0] - y[-1], 0.7]
+        fitted, _ = optimize.curve_fit(law, n, y, p0=start, bounds=bounds, max_nfev=100_000)
+        left = ((law(n, *fitted) - y) ** 2).sum()
+        assert ((law(n, ours.floor, ours.gain, ours.rate) - y) ** 2).sum() <= left * (1 + 1e-6)
+        assert ours.rate_low <= ours.rate <= ours.rate_high
 
 
 def test_outliers(study: Path) -> None:

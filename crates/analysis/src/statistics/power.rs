@@ -2,8 +2,8 @@
 //!
 //! # Theory
 //! Under an effect the t of a test has a noncentral distribution: t = (z + shift) / s, where s² is
-//! chi-square over its degrees of freedom. Its tail is integrated over s. The permutation test has the
-//! same power to a good approximation.
+//! chi-square over its degrees of freedom. Its tail is integrated over s. The permutation test has
+//! the same power to a good approximation.
 //!
 //! # Sources
 //! Cohen 1988, Statistical Power Analysis for the Behavioral Sciences.
@@ -22,8 +22,8 @@ pub enum Design {
 /// Steps of the integral; numerical.
 const STEPS: usize = 2000;
 
-/// Power of a two-sided test at level `alpha` to find an effect (in standard deviations; of the
-/// differences for pairs) with `n` participants in each group, or `n` pairs.
+/// Power of a two-sided test at level `alpha` with `n` participants in each group, or `n` pairs.
+/// The effect is in standard deviations, for pairs in those of the differences.
 pub fn power(design: Design, effect: f64, n: usize, alpha: f64) -> f64 {
     let size = n as f64;
     let (shift, freedom) = match design {

@@ -2,9 +2,9 @@
 //!
 //! # Theory
 //! Two-way analysis of variance of n participants by k trials gives the mean squares between
-//! participants (B), between trials (J) and of the error (E). ICC(2,1) = (B - E) / (B + (k-1) E +
-//! k (J - E) / n) counts a change between trials, such as learning, as error; ICC(3,1) = (B - E) / (B +
-//! (k-1) E) does not.
+//! participants (B), between trials (J) and of the error (E). ICC(2,1) = (B - E) / (B + (k-1) E + k
+//! (J - E) / n) counts a change between trials, such as learning, as error; ICC(3,1) = (B - E) / (B
+//! + (k-1) E) does not.
 //!
 //! # Sources
 //! Shrout and Fleiss 1979, Psychol Bull 86; the interval of ICC(2,1) as in McGraw and Wong 1996,

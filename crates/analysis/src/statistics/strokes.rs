@@ -1,9 +1,9 @@
 //! Strokes of the tool, told from its motion.
 //!
 //! # Theory
-//! A stroke begins where the smoothed speed of the tip rises over a threshold and ends where it falls
-//! under half of it, so that noise at the threshold does not split it; short ones are no strokes. The
-//! threshold is a share of the session's fast speed: slow hands make strokes too.
+//! A stroke begins where the smoothed speed of the tip rises over a threshold and ends where it
+//! falls under half of it, so that noise at the threshold does not split it; short ones are no
+//! strokes. The threshold is a share of the session's fast speed: slow hands make strokes too.
 //!
 //! # Sources
 //! Hysteresis as in the segmentation of reaching movements: Hogan and Sternad 2009, J Mot Behav 41.

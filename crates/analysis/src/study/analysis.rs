@@ -2,8 +2,8 @@
 //!
 //! # Practice
 //! A participant counts once in a comparison, by the mean over attempts. Incomplete recordings are
-//! left out; outliers are not. All comparisons of a study are one family of Holm's correction, so that
-//! the chance of any false finding is below the protocol's level.
+//! left out; outliers are not. All comparisons of a study are one family of Holm's correction, so
+//! that the chance of any false finding is below the protocol's level.
 
 use super::check::Answers;
 use super::plan::{letter, plan};
@@ -164,14 +164,14 @@ fn by_attempt(runs: &[&Run], measure: &str, task: &str, group: Option<usize>) ->
     values.into_values().map(means).collect()
 }
 
-/// Attempt, mean over participants, standard error.
-fn means_of(participants: &[&BTreeMap<usize, f64>]) -> Vec<(f64, f64, f64)> {
+fn means_of(participants: &[&BTreeMap<usize, f64>]) -> Vec<Attempt> {
     let mut by_attempt = BTreeMap::<usize, Vec<f64>>::new();
     for (attempt, value) in participants.iter().flat_map(|participant| participant.iter()) {
         by_attempt.entry(*attempt).or_default().push(*value);
     }
     let row = |(attempt, values): (usize, Vec<f64>)| {
-        (attempt as f64, mean(&values), (variance(&values) / values.len() as f64).sqrt())
+        let standard_error = (variance(&values) / values.len() as f64).sqrt();
+        Attempt { attempt, mean: mean(&values), standard_error }
     };
     by_attempt.into_iter().map(row).collect()
 }
@@ -186,11 +186,8 @@ fn learning(protocol: &Protocol, runs: &[&Run]) -> (Vec<Of<Attempt>>, Vec<Of<Law
         for (number, group) in protocol.groups.iter().enumerate() {
             let participants = by_attempt(runs, measure, task, Some(number));
             let means = means_of(&participants.iter().collect::<Vec<_>>());
-            let points = |means: &[(f64, f64, f64)]| means.iter().map(|(at, mean, _)| (*at, *mean)).collect::<Vec<_>>();
-            rows.extend(means.iter().map(|(attempt, mean, standard_error)| {
-                let (attempt, mean, standard_error) = (*attempt as usize, *mean, *standard_error);
-                of(measure, task, &group.name, Attempt { attempt, mean, standard_error })
-            }));
+            let points = |means: &[Attempt]| means.iter().map(|of| (of.attempt as f64, of.mean)).collect::<Vec<_>>();
+            rows.extend(means.iter().map(|is| of(measure, task, &group.name, *is)));
             let Some(law) = fit_power_law(&points(&means)) else { continue };
             let mut rng = Rng::with_seed(protocol.seed ^ 0x300 ^ laws.len() as u64);
             let rate = |_| {
@@ -220,20 +217,14 @@ fn reliabilities(protocol: &Protocol, runs: &[&Run]) -> Vec<Of<Reliability>> {
 
 /// Tells the groups apart by the participants' means of all measures in all tasks.
 fn classification(protocol: &Protocol, runs: &[&Run]) -> (Option<Classified>, Vec<usize>) {
-    let mut rows = BTreeMap::<&str, (usize, Vec<f64>)>::new();
-    let features: Vec<(&str, &str)> = measures_and_tasks(protocol).collect();
-    for run in runs {
-        rows.entry(&run.participant).or_insert((run.group, vec![f64::NAN; features.len()]));
-    }
-    for (at, (measure, task)) in features.iter().enumerate() {
-        for (code, values) in by_participant(runs.iter().filter(|run| run.task == *task), measure) {
-            if let Some((_, row)) = rows.get_mut(code) {
-                row[at] = mean(&values);
-            }
-        }
-    }
-    rows.retain(|_, (_, row)| row.iter().all(|value| value.is_finite()));
-    let (groups, rows): (Vec<usize>, Vec<Vec<f64>>) = rows.into_values().unzip();
+    let of = |(measure, task): (&str, &str)| by_participant(runs.iter().filter(|run| run.task == task), measure);
+    let features: Vec<_> = measures_and_tasks(protocol).map(of).collect();
+    let participants: BTreeMap<&str, usize> = runs.iter().map(|run| (run.participant.as_str(), run.group)).collect();
+    let row = |(code, group)| {
+        let row = features.iter().map(|values| Some(mean(values.get(code)?))).collect::<Option<Vec<f64>>>()?;
+        Some((group, row))
+    };
+    let (groups, rows): (Vec<usize>, Vec<Vec<f64>>) = participants.into_iter().filter_map(row).unzip();
     (classify(&rows, &groups, protocol.statistics.draws.min(999), protocol.seed), groups)
 }
 

@@ -61,27 +61,17 @@ pub fn missing(protocol: &Protocol, runs: &[Run], answers: &Answers) -> Vec<Stri
                     lines.push(format!("{code}: {count} of {} attempts at {}{place}", task.attempts, task.name));
                 }
             }
-            let unanswered: Vec<&str> = protocol
-                .questions
-                .iter()
-                .map(|question| question.item.as_str())
-                .filter(|item| {
-                    let condition = letter.cloned().unwrap_or_default();
-                    !answers.contains_key(&(code.clone(), condition, (*item).to_owned()))
-                })
-                .collect();
+            let key = |item: &str| (code.clone(), letter.cloned().unwrap_or_default(), item.to_owned());
+            let items = protocol.questions.iter().map(|question| question.item.as_str());
+            let unanswered: Vec<&str> = items.filter(|item| !answers.contains_key(&key(item))).collect();
             if !unanswered.is_empty() {
                 lines.push(format!("{code}: no answer{place} to {}", unanswered.join(", ")));
             }
         }
     }
     for run in runs {
-        let lacks: Vec<&str> = protocol
-            .measures
-            .iter()
-            .map(|measure| measure.score.as_str())
-            .filter(|score| !run.scores.contains_key(*score))
-            .collect();
+        let scores = protocol.measures.iter().map(|measure| measure.score.as_str());
+        let lacks: Vec<&str> = scores.filter(|score| !run.scores.contains_key(*score)).collect();
         if !lacks.is_empty() {
             let Run { participant, session, .. } = run;
             lines.push(format!("{participant}: session {session} has no score {}", lacks.join(", ")));

@@ -18,8 +18,8 @@ const COMPARISONS: &str =
 const RELIABILITY: &str =
     "measure task group participants attempts icc_2_1 icc_2_1_low icc_2_1_high icc_3_1 icc_3_1_low icc_3_1_high";
 
-/// Writes the page and its tables. `missing` lists what the study lacks; `names` lifts the blinding:
-/// the name behind each letter.
+/// Writes the page and its tables. `missing` lists what the study lacks; `names` lifts the
+/// blinding: the name behind each letter.
 pub fn write(
     protocol: &Protocol,
     results: &Results,
@@ -82,6 +82,9 @@ fn html(
 fn number(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
+    }
+    if value == 0.0 {
+        return "0".into();
     }
     let digits = 3 - value.abs().max(1e-3).log10().floor() as i32;
     format!("{value:.*}", digits.clamp(0, 4) as usize)

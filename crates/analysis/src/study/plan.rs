@@ -63,8 +63,8 @@ pub fn plan(protocol: &Protocol) -> Plan {
     Plan { participants, key }
 }
 
-/// A square of orders of `count` things. A Williams square of an odd number has twice the rows: each
-/// order also backwards.
+/// A square of orders of `count` things. A Williams square of an odd number has twice the rows:
+/// each order also backwards.
 fn square(order: Order, count: usize) -> Vec<Vec<usize>> {
     // Williams' first row: 0, 1, n-1, 2, n-2...
     let williams = |at: usize| {
@@ -105,8 +105,8 @@ impl Plan {
         self.key.iter().enumerate().map(name).collect()
     }
 
-    /// Writes `participants.csv`, `consent.txt`, `answers.csv` to fill in and, with conditions, `key.csv`
-    /// and a file of settings for each letter.
+    /// Writes `participants.csv`, `consent.txt`, `answers.csv` to fill in and, with conditions,
+    /// `key.csv` and a file of settings for each letter.
     pub fn write(&self, protocol: &Protocol, folder: &Path) -> Result<()> {
         whole(&folder.join("participants.csv"), self.participants_csv(protocol).as_bytes())?;
         whole(&folder.join("consent.txt"), protocol.consent.trim_start().as_bytes())?;

@@ -85,7 +85,7 @@ pub struct Group {
     pub simulated: Hand,
 }
 
-/// How simulated participants of a group do: each measure is `level` times its usual value times
+/// How simulated participants of a group do. A measure is `level` times its usual value times
 /// (1 + `gain` × attempt^-`rate`), and differs between participants and attempts.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]

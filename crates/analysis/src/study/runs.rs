@@ -38,8 +38,8 @@ pub struct Run {
     pub session: String,
 }
 
-/// Reads the runs from a folder of tables, and lists sessions that are no part of the study. Runs are
-/// sorted by participant, task, condition and time.
+/// Reads the runs from a folder of tables, and lists sessions that are no part of the study. Runs
+/// are sorted by participant, task, condition and time.
 pub fn runs(protocol: &Protocol, tables: &Path) -> Result<(Vec<Run>, Vec<String>)> {
     let database = Database::open(tables)?;
     let cases = database.rows(

@@ -1,10 +1,10 @@
 //! Simulated participants: scores by a law of practice, and recordings of made motion.
 //!
 //! # Theory
-//! A score is `usual × level × (1 + gain × attempt^-rate) × exp(a + e)`, where a is normal and the same
-//! in all attempts of a participant, and e is normal and new in each. The motion is a row of strokes of
-//! minimum jerk (Flash and Hogan 1985, J Neurosci 5) with pauses and tremor. Nobody operated: each
-//! summary, table and page says `simulated`.
+//! A score is `usual × level × (1 + gain × attempt^-rate) × exp(a + e)`, where a is normal and the
+//! same in all attempts of a participant, and e is normal and new in each. The motion is a row of
+//! strokes of minimum jerk (Flash and Hogan 1985, J Neurosci 5) with pauses and tremor. Nobody
+//! operated: each summary, table and page says `simulated`.
 
 use super::plan::{Participant, plan};
 use super::protocol::{Measure, Protocol};
@@ -76,8 +76,8 @@ fn normal(rng: &mut Rng) -> f64 {
     Normal::standard().inverse_cdf(rng.f64().clamp(1e-12, 1.0 - 1e-12))
 }
 
-/// Writes a session's folder for every run of simulated participants, and their answers. An error if
-/// the folder exists. Returns the number of sessions.
+/// Writes a session's folder for every run of simulated participants, and their answers. An error
+/// if the folder exists. Returns the number of sessions.
 pub fn simulate(protocol: &Protocol, out: &Path, seed: u64) -> Result<usize> {
     if out.exists() {
         bail!("{} is there already; give a new folder, so that real and simulated runs do not mix", shown(out));
