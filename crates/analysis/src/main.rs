@@ -91,8 +91,15 @@ enum Command {
     },
 }
 
-fn main() -> Result<()> {
-    match &Arguments::parse().command {
+fn main() {
+    if let Err(fault) = run(&Arguments::parse().command) {
+        eprintln!("error: {fault:#}");
+        std::process::exit(1);
+    }
+}
+
+fn run(command: &Command) -> Result<()> {
+    match command {
         Command::Export { runs, parquet } => export_tables(runs, parquet),
         Command::Query { runs, sql, csv } => run_query(runs, sql, csv.as_deref()),
         Command::Plan { protocol, out } => plan(protocol, out.as_deref()),
