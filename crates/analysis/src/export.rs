@@ -131,7 +131,7 @@ fn source(path: &Path) -> Result<Source> {
     let bytes = file.metadata().with_context(failed)?.len();
     let mut head = Vec::new();
     file.take(HEAD_BYTES).read_to_end(&mut head).with_context(failed)?;
-    let mut id = "s".to_owned();
+    let mut id = "s".to_owned(); // Readers take digits alone for a number.
     Sha256::digest(&head).iter().take(8).for_each(|byte| _ = write!(id, "{byte:02x}"));
     let results = facts::results_of(path);
     let length = |path: &Option<PathBuf>| path.as_ref().and_then(|path| fs::metadata(path).ok()).map_or(0, |m| m.len());
