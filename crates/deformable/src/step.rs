@@ -127,7 +127,7 @@ impl TissueCollision {
             foundation.make_room(self.nodes);
         }
         for (tet, split) in splits.iter().map(|split| (split.corner / 4, split)) {
-            for face in (0..4).filter(|&face| FACES[face].iter().any(|&c| c == split.corner as usize % 4)) {
+            for face in (0..4).filter(|&face| FACES[face].contains(&(split.corner as usize % 4))) {
                 let next = self.neighbours[tet as usize][face];
                 let held = self.tets.get(next as usize).copied().unwrap_or([NONE; 4]);
                 let is_apart = FACES[face].iter().any(|&c| !held.contains(&self.tets[tet as usize][c]));

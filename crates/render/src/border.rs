@@ -77,7 +77,7 @@ struct Whole {
 }
 
 /// What is shown of a cortex.
-struct Shown {
+struct CortexParts {
     embeddings: Vec<Embedding>,
     looks: Vec<Vec4>,
     triangles: Vec<[u32; 3]>,
@@ -163,8 +163,9 @@ impl Whole {
     /// The cortex in a mesh of which nodes were split, without the triangles of which all corners
     /// are in tetrahedra that are gone. What straddles a cut goes with one side of it, what
     /// straddles the edge of a hole stays: it covers the gap to the wall.
-    fn cortex(&self, mesh: &TetMesh, splits: &[Split], is_gone: impl Fn(u32) -> bool) -> Shown {
-        let mut made = Shown { embeddings: self.embeddings.clone(), looks: self.looks.clone(), triangles: Vec::new() };
+    fn cortex(&self, mesh: &TetMesh, splits: &[Split], is_gone: impl Fn(u32) -> bool) -> CortexParts {
+        let mut made =
+            CortexParts { embeddings: self.embeddings.clone(), looks: self.looks.clone(), triangles: Vec::new() };
         let mut is_cut = vec![false; self.tets.len()];
         splits
             .iter()

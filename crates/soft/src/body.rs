@@ -263,8 +263,9 @@ impl Body {
     /// Splits nodes where faces are cut; what a node is (fixed, anchored, of the membrane) its copy
     /// is too. `None`, and no change, where a split does not fit the mesh.
     ///
-    /// Of each part that nothing holds any more one node is tied to its place by a spring that is too
-    /// soft to be felt, 1e-6 N/mm: so the body passes its [check](Self::check), and the part is free.
+    /// Of each part that nothing holds any more one node is tied to its place by a spring that is
+    /// too soft to be felt, 1e-6 N/mm: so the body passes its [check](Self::check), and the part is
+    /// free.
     pub fn split(&mut self, splits: &[Split]) -> Option<()> {
         let mut mesh = self.mesh.clone();
         mesh.split(splits)?;

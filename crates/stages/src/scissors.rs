@@ -30,9 +30,8 @@ pub const MOST_CUTS: usize = 4096;
 /// Most splits of nodes.
 pub const MOST_SPLITS: usize = 16_384;
 
-/// A closing goes on with a cut beside it where their planes are so alike (cosine), and where
-/// tetrahedra are no further from its own, mm: else what lies between the two would come loose.
-/// Numerical.
+/// How alike two planes are (cosine), and how far tetrahedra may be from the new one, mm, where a
+/// closing goes on with a cut. Else what lies between the two would come loose. Numerical.
 const SAME_CUT: (f32, f32) = (0.9, 6.0);
 
 /// Which faces of the brain are cut.

@@ -19,7 +19,7 @@ fn german() -> Language {
 }
 
 /// Panels of a hand with the mouse, of a script and of a replay.
-fn panels() -> [Panel; 9] {
+fn panels() -> [Panel; 11] {
     let soft = [Tool::probe(2.0), Tool::spatula(), Tool::aspirator(), Tool::bipolar()];
     let tools = [Tool::burr(3.0), Tool::perforator(), Tool::craniotome()].into_iter().chain(soft).collect();
     let names = [

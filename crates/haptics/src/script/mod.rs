@@ -34,8 +34,8 @@ use trepan_geometry::{ToolState, Wrench};
 ///
 /// `aspirate` and `suck` are for the second hand: its tool approaches beside the burr and rests on
 /// the bone, or takes some of the brain away while the first hand does `retract`. `arm` leaves the
-/// spatula with an arm and takes a ball of tissue away beside it. `cut` opens the brain with scissors
-/// along a line and draws the slit apart with the spatula.
+/// spatula with an arm and takes a ball of tissue away beside it. `cut` opens the brain with
+/// scissors along a line and draws the slit apart with the spatula.
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
 /// minute. `press` and `retract` hold the brain aside with the probe and with the spatula. `resect`
 /// opens a flap, takes a ball of tissue away with the aspirator, layer by layer, and goes around

@@ -503,8 +503,8 @@ fn retract(site: &Site, plan: &Plan) -> Vec<Move> {
     ]
 }
 
-/// Places of a row of closings along the blades, mm, and their depths in the brain, mm, numerical:
-/// scissors cut some 8 mm wide and 10 mm high.
+/// Places of closings in a row along the blades, and their depths in the brain, mm, numerical.
+/// Scissors cut some 8 mm wide and 10 mm high.
 const SNIPS_MM: ([f32; 5], [f32; 2]) = ([-12.0, -6.0, 0.0, 6.0, 12.0], [5.0, 11.0]);
 
 /// Cuts the brain along a line in two depths, then presses the spatula into the slit and draws it

@@ -1,5 +1,5 @@
-//! Cuts and removals while a body moves: what ten thousands of them do, how right the opened body
-//! is, and what a change of solvers costs.
+//! Cuts and removals while a body moves: what many do, how right the opened body is, and what a
+//! change of solvers costs.
 //!
 //! # Theory
 //! A cut that opens pushes nothing, so kinetic and elastic energy together may only fall, whatever
@@ -160,8 +160,9 @@ fn with_slit(body: &Body, from_mm: f32) -> Vec<Split> {
     splits
 }
 
-/// A block with a slit under its own weight: cut in motion against the implicit solution for the
-/// opened mesh, of the same linear tetrahedra; quadratic ones say what those are worth here.
+/// A block that is cut in motion and comes to rest, against the implicit solution of its mesh.
+///
+/// Quadratic tetrahedra say what the linear ones are worth here.
 fn slit(findings: &mut Findings) {
     let mesh = boxes::split_box([10, 5, 10], Vec3::new(32.0, 16.0, 32.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
@@ -204,8 +205,9 @@ fn slit(findings: &mut Findings) {
     findings.gates.push(Gate::at_most(name, same, 5.0));
 }
 
-/// What the solver's thread spends on a change to a solver of the split body, at 20 thousand
-/// tetrahedra, and the thread beside it on making that.
+/// What a change of solvers costs at 20 thousand tetrahedra.
+///
+/// The solver's thread makes the change; the thread beside it makes the solver.
 fn cost(findings: &mut Findings) {
     let mesh = boxes::split_box([15, 15, 15], Vec3::splat(60.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
