@@ -66,8 +66,7 @@ pub trait SoftSolver: Send {
         &[]
     }
 
-    /// Length of the last step that was made, ms: velocities are behind by half of it. 0 for solvers
-    /// in which they are not.
+    /// Length of the last step that was made, ms, by half of which velocities are behind; else 0.
     fn last_step_ms(&self) -> f32 {
         0.0
     }

@@ -225,7 +225,7 @@ fn a_held_button_ends_every_feed_at_the_inner_table_or_a_set_depth_in_the_brain(
         snips.picture(Vec3::new(0.0, 0.0, -7.0), HOLDS, &slab);
         snips.guide.pedal()
     });
-    assert!(closes.is_some() && (snips.tip.translation.z + 6.2 + SNIP_MM).abs() < 0.3, "{}", snips.tip.translation.z);
+    assert!(closes.is_some() && (snips.tip.translation.z + 5.5 + SNIP_MM).abs() < 0.3, "{}", snips.tip.translation.z);
     let scalpel = deepest(Tool::scalpel(), &slab);
     assert!((scalpel + 6.5 + INCISE_MM).abs() < 0.2, "through the dura and no further: {scalpel}");
     let spatula = deepest(Tool::spatula(), &no_brain);
