@@ -59,8 +59,11 @@ pub(crate) fn mixed<V: Mix>(
     next: [usize; 3],
     value: impl Fn(usize) -> V,
 ) -> V {
-    let mix = |a: V, b: V, share: f32| a + (b - a) * share;
-    let line = |start: usize| mix(value(start), value(start + next[0]), u);
-    let plane = |start: usize| mix(line(start), line(start + next[1]), v);
-    mix(plane(x + y + z), plane(x + y + z + next[2]), w)
+    // Written out: closures within closures become calls.
+    let (lower, upper) = (x + y + z, x + y + z + next[2]);
+    let [a, b, c, d] = [value(lower), value(lower + next[0]), value(lower + next[1]), value(lower + next[0] + next[1])];
+    let [e, f, g, h] = [value(upper), value(upper + next[0]), value(upper + next[1]), value(upper + next[0] + next[1])];
+    let (ab, cd, ef, gh) = (a + (b - a) * u, c + (d - c) * u, e + (f - e) * u, g + (h - g) * u);
+    let (near, far) = (ab + (cd - ab) * v, ef + (gh - ef) * v);
+    near + (far - near) * w
 }
