@@ -59,6 +59,33 @@ pub(crate) struct Border {
     pub own: usize,
     /// Vertices of the dura, after the brain's.
     leaves: usize,
+    /// Vertices that lie on what a tool touches.
+    touched: Vec<u32>,
+    /// The nodes' stains, as they were given last.
+    stained: Option<Vec<u8>>,
+    /// What changed since `settle`.
+    pub changes: Changes,
+}
+
+/// What of a border looks different than before.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Changes {
+    /// Whether nothing is as it was, or nobody knows.
+    pub all: bool,
+    /// Whether each vertex moved.
+    pub moved: Vec<bool>,
+    /// Whether each vertex looks different: its normal or its stain.
+    turned: Vec<bool>,
+    /// The triangles that look different, in order.
+    pub triangles: Vec<u32>,
+}
+
+/// Motion of a node that is not followed, mm, numerical: a tenth of a pixel of 1280x800.
+const STILL_MM: f32 = 0.01;
+
+/// Whether a place is so near to where it was that it may stay there.
+fn is_still(was: Vec3, is: Vec3) -> bool {
+    was.distance_squared(is) < STILL_MM * STILL_MM
 }
 
 /// The whole brain.
@@ -139,7 +166,7 @@ impl Whole {
             let mut triangles = fine.triangles.clone();
             chunks::sort(&mut triangles, &fine.positions);
             let mut normals = vec![Vec3::ZERO; fine.positions.len()];
-            smooth_normals(&fine.positions, &triangles, &mut normals);
+            smooth_normals(&fine.positions, &triangles, &mut normals, &Changes { all: true, ..Changes::default() });
             let look = |(n, (place, normal)): (usize, (&Vec3, &Vec3))| {
                 let depth_mm = depth_mm.get(n).copied().unwrap_or_default();
                 let open = DARKEST + (PIA - DARKEST) * (-depth_mm / DARK_MM).exp();
@@ -245,6 +272,9 @@ impl Border {
             stains: Vec::new(),
             own: 0,
             leaves: 0,
+            touched: Vec::new(),
+            stained: None,
+            changes: Changes::default(),
         };
         made.shown();
         made
@@ -261,6 +291,25 @@ impl Border {
         self.stains = vec![0.0; self.embeddings.len()];
         (self.own, self.leaves) = (self.triangles.len(), 0);
         self.chunks = Chunk::all(&self.triangles, &self.at_rest);
+        self.renew();
+    }
+
+    /// Marks all as changed.
+    fn renew(&mut self) {
+        self.changes.all = true;
+        self.touched.clear();
+        self.stained = None;
+    }
+
+    /// Begins to note changes: all that is now has been seen.
+    pub fn settle(&mut self) {
+        let Changes { all, moved, turned, triangles } = &mut self.changes;
+        *all = false;
+        for flags in [moved, turned] {
+            flags.clear();
+            flags.resize(self.places.len(), false);
+        }
+        triangles.clear();
     }
 
     /// Shows the mesh without the tetrahedra that are `gone` and opened where nodes were split;
@@ -330,42 +379,74 @@ impl Border {
             self.normals.resize(brain + wanted, Vec3::ZERO);
             self.stains.resize(brain + wanted, DURA);
             self.looks.resize(brain + wanted, BARE);
+            self.renew();
         }
         self.at_rest[brain..].copy_from_slice(rest);
-        self.places[brain..].copy_from_slice(places);
+        for (n, (at, place)) in (brain..).zip(self.places[brain..].iter_mut().zip(*places)) {
+            if self.changes.all || !is_still(*at, *place) {
+                *at = *place;
+                self.changes.moved.get_mut(n).into_iter().for_each(|moved| *moved = true);
+            }
+        }
         Ok(is_other)
     }
 
     /// Updates the vertices from the mesh's nodes, or resets them to rest.
     ///
-    /// They are drawn onto what the balls of tools touch, with their radii, mm.
+    /// They are drawn onto what the balls of tools touch, with their radii, mm. After `settle`
+    /// nodes that moved by less than 0.01 mm stay where they are. Call it after `cover` and
+    /// `stain`.
     pub fn follow(&mut self, positions: Option<&[Vec3]>, balls: &[(Vec3, f32)]) -> Result<(), RenderError> {
         let positions = positions.unwrap_or(&self.rest);
         let (given, wanted) = (positions.len(), self.rest.len());
         if given != wanted {
             return Err(RenderError::Nodes { wanted, given });
         }
-        self.now.copy_from_slice(positions);
+        let all = self.changes.all;
+        let stirs = |(now, next): (&mut Vec3, &Vec3)| {
+            let stirs = all || !is_still(*now, *next);
+            *now = if stirs { *next } else { *now };
+            stirs
+        };
+        let stirred: Vec<bool> = self.now.iter_mut().zip(positions).map(stirs).collect();
         let now = &self.now;
-        self.places.par_iter_mut().zip(&self.embeddings).for_each(|(place, embedding)| *place = embedding.place(now));
+        let before = if all { Vec::new() } else { self.places.clone() };
         let cortex = self.first_wall.min(self.places.len());
+        self.places.par_iter_mut().zip(&self.embeddings).enumerate().for_each(|(n, (place, embedding))| {
+            // Walls are smoothed anew from where the tetrahedra have them.
+            if n >= cortex || embedding.nodes.iter().any(|node| stirred[*node as usize]) {
+                *place = embedding.place(now);
+            }
+        });
+        for n in std::mem::take(&mut self.touched) {
+            self.places[n as usize] = self.embeddings[n as usize].place(&self.now);
+        }
         self.walls.smooth(&mut self.places[cortex..]);
-        touch(&mut self.places[..self.embeddings.len()], &self.faces, &self.now, balls);
-        smooth_normals(&self.places, &self.triangles, &mut self.normals);
-        let ways = self.places[..self.embeddings.len()].par_iter().zip(&self.at_rest);
-        let moved = ways.map(|(place, rest)| place.distance_squared(*rest)).reduce(|| 0.0, f32::max);
-        self.moved_mm = moved.sqrt();
+        self.touched = touch(&mut self.places[..self.embeddings.len()], &self.faces, &self.now, balls);
+        if self.changes.note(&before, &self.places[..self.embeddings.len()], &self.triangles) {
+            smooth_normals(&self.places, &self.triangles, &mut self.normals, &self.changes);
+            let ways = self.places[..self.embeddings.len()].par_iter().zip(&self.at_rest);
+            let moved = ways.map(|(place, rest)| place.distance_squared(*rest)).reduce(|| 0.0, f32::max);
+            self.moved_mm = moved.sqrt();
+        }
         Ok(())
     }
 
     /// Takes the stain of each node, as in a frame.
     pub fn stain(&mut self, stains: Option<&[u8]>) {
+        if !self.changes.all && self.stained.as_deref() == stains {
+            return;
+        }
+        self.stained = stains.map(<[u8]>::to_vec);
         let mm = |stain: u8| if stain == u8::MAX { -1.0 } else { 0.01 * f32::from(stain) };
         let of = |node: u32| stains.and_then(|all| all.get(node as usize)).map_or(0.0, |stain| mm(*stain));
-        for (stain, embedding) in self.stains.iter_mut().zip(&self.embeddings) {
+        for (n, (stain, embedding)) in self.stains.iter_mut().zip(&self.embeddings).enumerate() {
             let weights = embedding.weights.map(|weight| weight.max(0.0));
             let sum: f32 = (0..4).map(|k| weights[k] * of(embedding.nodes[k])).sum();
-            *stain = if stains.is_some() { sum / weights.iter().sum::<f32>().max(1.0) } else { 0.0 };
+            let is = if stains.is_some() { sum / weights.iter().sum::<f32>().max(1.0) } else { 0.0 };
+            if is != std::mem::replace(stain, is) {
+                self.changes.turned.get_mut(n).into_iter().for_each(|turned| *turned = true);
+            }
         }
     }
 
@@ -387,19 +468,55 @@ impl Border {
     }
 }
 
-/// Area-weighted mean of the triangle normals at every vertex; zero where they cancel. Each thread
-/// sums for some of the vertices.
-fn smooth_normals(places: &[Vec3], triangles: &[[u32; 3]], normals: &mut [Vec3]) {
+impl Changes {
+    /// Notes which vertices are elsewhere than before, and the triangles that therefore look
+    /// different; returns whether any does.
+    fn note(&mut self, before: &[Vec3], places: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+        if self.all {
+            return true;
+        }
+        for (moved, (was, is)) in self.moved.iter_mut().zip(before.iter().zip(places)) {
+            *moved |= was != is;
+        }
+        let Self { moved, turned, triangles: looking, .. } = self;
+        let any = |of: &[bool], corners: &[u32; 3]| corners.iter().any(|n| of[*n as usize]);
+        for corners in triangles.iter().filter(|corners| any(moved, corners)) {
+            corners.iter().for_each(|n| turned[*n as usize] = true);
+        }
+        looking.clear();
+        looking.extend((0u32..).zip(triangles).filter(|(_, corners)| any(turned, corners)).map(|(n, _)| n));
+        !looking.is_empty()
+    }
+}
+
+/// Area-weighted mean of the triangle normals at every vertex that turned; zero where they cancel.
+/// Each thread sums for some of the vertices.
+fn smooth_normals(places: &[Vec3], triangles: &[[u32; 3]], normals: &mut [Vec3], changes: &Changes) {
+    let turned = |n: usize| changes.all || changes.turned[n];
+    let twice_area = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|n| places[n as usize]);
+        (b - a).cross(c - a)
+    };
+    if !changes.all {
+        let turning = || (0..normals.len()).filter(|n| turned(*n));
+        let all: Vec<usize> = turning().collect();
+        all.iter().for_each(|n| normals[*n] = Vec3::ZERO);
+        for corners in changes.triangles.iter().map(|n| &triangles[*n as usize]) {
+            let area = twice_area(corners);
+            corners.iter().filter(|n| turned(**n as usize)).for_each(|n| normals[*n as usize] += area);
+        }
+        all.iter().for_each(|n| normals[*n] = normals[*n].normalize_or_zero());
+        return;
+    }
     let many = normals.len().div_ceil(rayon::current_num_threads()).max(1);
     normals.par_chunks_mut(many).enumerate().for_each(|(n, normals)| {
         let own = n * many..n * many + normals.len();
         normals.fill(Vec3::ZERO);
         for corners in triangles {
-            let corners = corners.map(|n| n as usize);
-            if corners.iter().any(|n| own.contains(n)) {
-                let [a, b, c] = corners.map(|n| places[n]);
-                let twice_area = (b - a).cross(c - a);
-                corners.iter().filter(|n| own.contains(n)).for_each(|n| normals[n - own.start] += twice_area);
+            if corners.iter().any(|n| own.contains(&(*n as usize))) {
+                let area = twice_area(corners);
+                let ours = corners.iter().map(|n| *n as usize).filter(|n| own.contains(n));
+                ours.for_each(|n| normals[n - own.start] += area);
             }
         }
         normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());

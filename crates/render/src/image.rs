@@ -1,5 +1,6 @@
 //! A finished picture and its PNG file.
 
+use std::ops::Range;
 use std::path::Path;
 
 /// Pixels from the upper left, row by row, sRGB with alpha.
@@ -26,7 +27,7 @@ impl Image {
         let mut rgba = vec![0; 4 * width as usize * height as usize];
         let enlarge = Enlarge::of(bytemuck::cast_slice(&self.rgba), [self.width, self.height], [width, height]);
         let rows = rgba.chunks_exact_mut(4 * width.max(1) as usize).enumerate();
-        rows.for_each(|(y, row)| enlarge.row(y, bytemuck::cast_slice_mut(row)));
+        rows.for_each(|(y, row)| enlarge.row(y, 0..width as usize, bytemuck::cast_slice_mut(row)));
         Self { width, height, rgba }
     }
 
@@ -98,23 +99,36 @@ impl<'a> Enlarge<'a> {
         Self { from, width: size[0] as usize, columns, rows }
     }
 
-    /// Fills row `y` of the larger picture.
-    pub fn row(&self, y: usize, to: &mut [[u8; 4]]) {
+    /// Fills columns of row `y` of the larger picture.
+    pub fn row(&self, y: usize, columns: Range<usize>, to: &mut [[u8; 4]]) {
         let Between { first, second, share } = self.rows[y];
         let [upper, lower] = [first, second].map(|y| &self.from[self.width * y..self.width * (y + 1)]);
-        if share == 0 && self.width == to.len() {
-            return to.copy_from_slice(upper);
+        if share == 0 && self.width == self.columns.len() {
+            return to.copy_from_slice(&upper[columns]);
         }
+        let columns = &self.columns[columns];
+        let [Some(left), Some(right)] = [columns.first(), columns.last()] else { return };
+        let (start, end) = (left.first, right.second + 1);
         // The two rows are mixed first: they have fewer pixels.
-        let down: Vec<[u32; 4]> = upper
-            .iter()
-            .zip(lower)
+        let mixed = upper[start..end].iter().zip(&lower[start..end]);
+        let down: Vec<[u32; 4]> = mixed
             .map(|(a, b)| [0, 1, 2, 3].map(|c| u32::from(a[c]) * (256 - share) + u32::from(b[c]) * share))
             .collect();
-        for (pixel, at) in to.iter_mut().zip(&self.columns) {
-            let (a, b) = (down[at.first], down[at.second]);
+        for (pixel, at) in to.iter_mut().zip(columns) {
+            let (a, b) = (down[at.first - start], down[at.second - start]);
             *pixel = [0, 1, 2, 3].map(|c| ((a[c] * (256 - at.share) + b[c] * at.share + (1 << 15)) >> 16) as u8);
         }
+    }
+
+    /// The rows of the smaller picture between which row `y` of the larger one lies.
+    pub fn between(&self, y: usize) -> [usize; 2] {
+        [self.rows[y].first, self.rows[y].second]
+    }
+
+    /// The columns of the larger picture that columns of the smaller one reach.
+    pub fn reached(&self, columns: Range<usize>) -> Range<usize> {
+        let first = self.columns.partition_point(|at| at.second < columns.start);
+        first..self.columns.partition_point(|at| at.first < columns.end)
     }
 }
 

@@ -18,6 +18,8 @@ pub(crate) struct Mri {
 pub(crate) struct Signals {
     pub dims: [usize; 3],
     pub texels: Vec<[u8; 4]>,
+    /// Whether any texel has a mark.
+    pub is_marked: bool,
     /// Texture coordinates, 0 to 1, of a world point.
     pub texture_from_world: Mat4,
 }
@@ -55,7 +57,8 @@ impl Signals {
         let dims = DVec3::from(volume.dims.map(|n| n as f64));
         let texture_from_voxel = DAffine3::from_scale(1.0 / dims) * DAffine3::from_translation(DVec3::splat(0.5));
         let texture_from_world = DMat4::from(texture_from_voxel * voxel_from_world).as_mat4();
-        Ok(Self { dims: volume.dims, texels, texture_from_world })
+        let is_marked = tint.is_some_and(|tint| tint.iter().any(|mark| *mark != [0; 3]));
+        Ok(Self { dims: volume.dims, texels, is_marked, texture_from_world })
     }
 }
 

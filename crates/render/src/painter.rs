@@ -13,6 +13,7 @@ use crate::image::Image;
 use crate::kept::SceneCache;
 use crate::report::DrawReport;
 use crate::{Casting, ProcessorRenderer, RenderError, Renderer, View};
+use std::borrow::Cow;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
 
@@ -77,21 +78,31 @@ impl Painter {
 
     /// Draws a picture and waits for it.
     pub fn picture(&mut self, frame: &Frame) -> Result<(Image, DrawReport), RenderError> {
-        let (why, size) = match &mut self.by {
-            By::Processor(processor) => {
-                let report = processor.draw(frame)?;
-                return Ok((processor.image().clone(), report));
-            }
+        self.draw(frame).map(|(image, report)| (image.into_owned(), report))
+    }
+
+    /// Draws a picture and waits for it; the processor lends its own.
+    pub fn draw(&mut self, frame: &Frame) -> Result<(Cow<'_, Image>, DrawReport), RenderError> {
+        let lost = match &mut self.by {
+            By::Processor(_) => None,
             By::Device(renderer) => match on_device(renderer, frame) {
-                Err(RenderError::Gpu(why)) => (why, renderer.size()),
-                done => return done,
+                Err(RenderError::Gpu(why)) => Some((why, renderer.size())),
+                done => return done.map(|(image, report)| (Cow::Owned(image), report)),
             },
         };
-        self.notice = Some(format!("{why}; the processor draws from here on"));
-        self.by = By::Processor(Box::new(ProcessorRenderer::with(self.kept.clone(), size)?));
-        let (sparse, detail) = self.quality;
-        self.set_quality(sparse, detail)?;
-        self.picture(frame)
+        if let Some((why, size)) = lost {
+            self.notice = Some(format!("{why}; the processor draws from here on"));
+            self.by = By::Processor(Box::new(ProcessorRenderer::with(self.kept.clone(), size)?));
+            let (sparse, detail) = self.quality;
+            self.set_quality(sparse, detail)?;
+        }
+        match &mut self.by {
+            By::Processor(processor) => {
+                let report = processor.draw(frame)?;
+                Ok((Cow::Borrowed(processor.image()), report))
+            }
+            By::Device(renderer) => on_device(renderer, frame).map(|(image, report)| (Cow::Owned(image), report)),
+        }
     }
 
     /// Smooths the edges of the last picture, of the same frame, by one more sample of a pixel;

@@ -15,8 +15,10 @@ const NEAR_MM: [f32; 2] = [3.0, 9.0];
 /// Gaps between a tip and what it meets from which on it touches, and none of it, mm, numerical.
 const GAP_MM: [f32; 2] = [0.5, 2.0];
 
-/// Moves the places near balls, with their radii, mm, onto the faces that these touch.
-pub(crate) fn touch(places: &mut [Vec3], faces: &[[u32; 3]], nodes: &[Vec3], balls: &[(Vec3, f32)]) {
+/// Moves the places near balls, with their radii, mm, onto the faces that these touch; returns
+/// which.
+pub(crate) fn touch(places: &mut [Vec3], faces: &[[u32; 3]], nodes: &[Vec3], balls: &[(Vec3, f32)]) -> Vec<u32> {
+    let mut moved = Vec::new();
     for &(middle, radius_mm) in balls {
         let reach_mm = radius_mm + NEAR_MM[1];
         let around = Aabb { min: middle - reach_mm, max: middle + reach_mm };
@@ -38,13 +40,16 @@ pub(crate) fn touch(places: &mut [Vec3], faces: &[[u32; 3]], nodes: &[Vec3], bal
         if touches <= 0.0 {
             continue;
         }
-        for place in places.iter_mut().filter(|place| place.distance_squared(middle) < reach_mm * reach_mm) {
+        let is_near = |(_, place): &(u32, &mut Vec3)| place.distance_squared(middle) < reach_mm * reach_mm;
+        for (n, place) in (0..).zip(places.iter_mut()).filter(is_near) {
             let share = touches * (1.0 - step(NEAR_MM, place.distance(middle) - radius_mm));
             if let Some(on) = onto(*place).filter(|_| share > 0.0) {
                 *place = place.lerp(on, share);
+                moved.push(n);
             }
         }
     }
+    moved
 }
 
 /// A smooth step between two values.

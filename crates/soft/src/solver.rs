@@ -66,7 +66,7 @@ pub trait SoftSolver: Send {
         &[]
     }
 
-    /// Length of the last step that was made, ms, by half of which velocities are behind; else 0.
+    /// Length of the last step, ms, by half of which velocities are behind; 0 where they are not.
     fn last_step_ms(&self) -> f32 {
         0.0
     }

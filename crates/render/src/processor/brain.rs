@@ -5,6 +5,7 @@
 //! cortex has half a million triangles, a picture shows a tenth of them.
 
 use super::rows;
+use super::tiles::Tiles;
 use crate::border::Border;
 use crate::bricks::NOTHING;
 use crate::camera::View;
@@ -12,6 +13,7 @@ use crate::chunks::Chunk;
 use crate::cut::height;
 use crate::section::{self, Corner};
 use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// The nearest triangle at every pixel.
@@ -24,6 +26,8 @@ pub(crate) struct Fragments {
     drawn: bool,
     /// The brain's vertices in the view.
     vertices: Vec<Vertex>,
+    /// Lower and upper corner of each chunk of triangles in the view, pixels.
+    boxes: Vec<[Vec2; 2]>,
     /// Triangles of the cut, after those of the brain.
     cut: Vec<[Corner; 3]>,
     first_cut: u32,
@@ -91,6 +95,12 @@ impl Fragments {
         Self { width, height, nearest: vec![NOWHERE; width * height], ..Self::default() }
     }
 
+    /// One over the depth at a pixel, 1/mm; 0 where nothing is seen.
+    pub fn nearness(&self, pixel: usize) -> f32 {
+        let Meeting { nearness, triangle, .. } = self.nearest[pixel];
+        if triangle & BACK == 0 { nearness } else { 0.0 }
+    }
+
     /// Distance along the ray at a pixel, mm, or [`NOTHING`].
     pub fn t(&self, brain: Option<&Border>, pixel: usize) -> f32 {
         self.at(brain, pixel).t
@@ -122,28 +132,97 @@ impl Fragments {
     }
 
     /// Redraws the boundary and its cut; `None` clears.
-    pub fn draw(&mut self, border: Option<&Border>, view: &View, brain_cut: Vec4, threads: usize) {
-        if std::mem::replace(&mut self.drawn, border.is_some()) {
+    ///
+    /// In a view that was drawn before only what changed is drawn again: its tiles are marked.
+    pub fn draw(
+        &mut self,
+        border: Option<&Border>,
+        view: &View,
+        brain_cut: Vec4,
+        threads: usize,
+        known: Option<&mut Tiles>,
+    ) {
+        let all = known.is_none();
+        if std::mem::replace(&mut self.drawn, border.is_some()) && all {
             self.nearest.fill(NOWHERE);
         }
         let Some(border) = border else { return };
         (self.plane, self.eye, self.first_cut) = (brain_cut, view.eye, border.triangles.len() as u32);
-        let size = Vec2::new(self.width as f32, self.height as f32);
-        self.vertices.resize(border.places.len(), Vertex { at: Vec2::ZERO, nearness: 0.0 });
-        let many = border.places.len().div_ceil(threads.max(1)).max(1);
-        rows::share(threads, self.vertices.chunks_mut(many).enumerate(), |n, chunk| {
-            let places = &border.places[n * many..];
-            chunk.iter_mut().zip(places).for_each(|(vertex, place)| *vertex = Vertex::seen(view, size, *place));
-        });
         self.cut.clear();
         if brain_cut != Vec4::ZERO {
             self.cut.extend(section::triangles(brain_cut, border));
         }
+        let mut tiles = Tiles::of([self.width, self.height]);
+        match known {
+            Some(known) => {
+                self.follow(border, view, &mut tiles);
+                known.join(&tiles);
+            }
+            None => {
+                tiles.fill(true);
+                self.project(border, view);
+            }
+        }
+        if tiles.marks().contains(&true) {
+            self.rasterise(border, view, threads, (!all).then_some(&tiles));
+        }
+    }
+
+    /// Projects all vertices.
+    fn project(&mut self, border: &Border, view: &View) {
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let seen = |place: &Vec3| Vertex::seen(view, size, *place);
+        border.places.par_iter().map(seen).collect_into_vec(&mut self.vertices);
+        let vertices = &self.vertices;
+        border.chunks.par_iter().map(|chunk| around(border, chunk, vertices)).collect_into_vec(&mut self.boxes);
+    }
+
+    /// Projects the vertices that moved; marks where a triangle looks different.
+    fn follow(&mut self, border: &Border, view: &View, tiles: &mut Tiles) {
+        let changes = &border.changes;
+        self.mark(border, tiles);
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let moved = changes.moved.iter().zip(&border.places);
+        for (vertex, (_, place)) in self.vertices.iter_mut().zip(moved).filter(|(_, (moved, _))| **moved) {
+            *vertex = Vertex::seen(view, size, *place);
+        }
+        self.mark(border, tiles);
+        let mut next = 0;
+        for (chunk, bounds) in border.chunks.iter().zip(&mut self.boxes) {
+            let some = changes.triangles[next..].iter().take_while(|n| (**n as usize) < chunk.triangles.end).count();
+            next += some;
+            if some > 0 {
+                *bounds = around(border, chunk, &self.vertices);
+            }
+        }
+    }
+
+    /// Marks where the triangles that look different are seen.
+    fn mark(&self, border: &Border, tiles: &mut Tiles) {
+        for &n in &border.changes.triangles {
+            let corners = border.triangles[n as usize].map(|n| &self.vertices[n as usize]);
+            let [a, b, c] = corners.map(|v| v.at);
+            let is_back = (b - a).perp_dot(c - a) > 0.0;
+            let is_hidden = is_back && border.is_closed() && (n as usize) < border.own;
+            if !is_hidden && corners.iter().all(|v| v.nearness > 0.0) {
+                tiles.mark(a.min(b).min(c), a.max(b).max(c));
+            }
+        }
+    }
+
+    /// Draws all triangles, or those that meet marked tiles.
+    fn rasterise(&mut self, border: &Border, view: &View, threads: usize, tiles: Option<&Tiles>) {
+        let threads = tiles.map_or(threads, |tiles| tiles.threads(threads));
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let is_seen = |[low, high]: &[Vec2; 2]| {
+            let is_inside = low.x < size.x && low.y < size.y && high.x > 0.0 && high.y > 0.0;
+            is_inside && tiles.is_none_or(|tiles| tiles.meet(*low, *high))
+        };
+        let chunks = border.chunks.iter().zip(&self.boxes).filter(|(_, bounds)| is_seen(bounds));
+        let chunks: Vec<(Range<usize>, [Vec2; 2])> = chunks.map(|(c, bounds)| (c.triangles.clone(), *bounds)).collect();
+        let brain_cut = self.plane;
         let (vertices, cut) = (&self.vertices, &self.cut);
-        let rows = |chunk| (chunk, Chunk::rows(chunk, view, size, border.moved_mm));
-        let chunks: Vec<(&Chunk, Range<usize>)> =
-            border.chunks.iter().map(rows).filter(|(_, rows)| !rows.is_empty()).collect();
-        let ends = bands(vertices, self.height, threads);
+        let ends = bands(chunks.iter().map(|(_, [low, high])| 0.5 * (low.y + high.y)), self.height, threads);
         let mut nearest = &mut self.nearest[..];
         let parts = ends.windows(2).map(|ends| {
             let (part, rest) = std::mem::take(&mut nearest).split_at_mut(self.width * (ends[1] - ends[0]));
@@ -153,10 +232,15 @@ impl Fragments {
         let parts: Vec<(usize, &mut [Meeting])> = parts.collect();
         rows::share(threads, parts.into_iter(), |first, part| {
             let rows = first..first + part.len() / self.width.max(1);
-            let mut band = Band { width: self.width, rows, nearest: part };
-            let Range { start, end } = band.rows;
-            let seen = chunks.iter().filter(|(_, seen)| seen.start < end && start < seen.end);
-            for n in seen.flat_map(|(chunk, _)| chunk.triangles.clone()) {
+            let (start, end) = (rows.start as f32, rows.end as f32);
+            if let Some(tiles) = tiles {
+                for (y, row) in rows.clone().zip(part.chunks_exact_mut(self.width)) {
+                    tiles.spans(y).for_each(|span| row[span].fill(NOWHERE));
+                }
+            }
+            let mut band = Band { width: self.width, rows, nearest: part, tiles };
+            let seen = chunks.iter().filter(|(_, [low, high])| low.y < end && start < high.y);
+            for n in seen.flat_map(|(triangles, _)| triangles.clone()) {
                 let corners = border.triangles[n].map(|n| n as usize);
                 // What turns its back is hidden by what is before it, or shows that it was cut.
                 let side = match border.is_closed() && n < border.own {
@@ -178,10 +262,16 @@ impl Fragments {
     }
 }
 
-/// Rows at which as many bands begin and end as there are threads, with as many vertices each.
-fn bands(vertices: &[Vertex], height: usize, threads: usize) -> Vec<usize> {
-    const STEP: usize = 64;
-    let mut rows: Vec<f32> = vertices.iter().step_by(STEP).map(|vertex| vertex.at.y).collect();
+/// The box around a chunk's triangles in the view, without what is behind the eye.
+fn around(border: &Border, chunk: &Chunk, vertices: &[Vertex]) -> [Vec2; 2] {
+    let corners = border.triangles[chunk.triangles.clone()].iter().flatten().map(|n| &vertices[*n as usize]);
+    let before = corners.filter(|vertex| vertex.nearness > 0.0 && vertex.at.is_finite());
+    before.fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], v| [low.min(v.at), high.max(v.at)])
+}
+
+/// Rows at which as many bands begin and end as there are threads, with as many chunks each.
+fn bands(middles: impl Iterator<Item = f32>, height: usize, threads: usize) -> Vec<usize> {
+    let mut rows: Vec<f32> = middles.collect();
     rows.sort_unstable_by(f32::total_cmp);
     let middle = |n: usize| rows.get(n * rows.len() / threads.max(1)).copied().unwrap_or(0.0);
     let mut ends: Vec<usize> = (1..threads).map(|n| (middle(n).max(0.0) as usize).min(height)).collect();
@@ -206,6 +296,8 @@ struct Band<'a> {
     width: usize,
     rows: Range<usize>,
     nearest: &'a mut [Meeting],
+    /// The tiles that are drawn; all if `None`. In others a triangle changes nothing.
+    tiles: Option<&'a Tiles>,
 }
 
 impl Band<'_> {
@@ -221,6 +313,9 @@ impl Band<'_> {
             return;
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        if self.tiles.is_some_and(|tiles| !tiles.meet(low, high)) {
+            return;
+        }
         let lines = first(low.y).max(self.rows.start)..past(high.y).min(self.rows.end);
         let columns = first(low.x)..past(high.x).min(self.width);
         if lines.is_empty() || columns.is_empty() || corners.iter().any(|v| v.nearness <= 0.0) {

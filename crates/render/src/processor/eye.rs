@@ -2,7 +2,9 @@
 
 use super::brain::Fragments;
 use super::edges::Edges;
+use super::reuse::{LastPicture, near};
 use super::skull::{Ray, TILE, cast, clear};
+use super::tiles::{EDGE, Tiles};
 use super::{Inputs, light, overlay, rows};
 use crate::border::Border;
 use crate::bricks::NOTHING;
@@ -10,6 +12,7 @@ use crate::camera::{SAMPLES, View};
 use crate::image::{Enlarge, Image};
 use crate::overlay::Item;
 use crate::recast::Recast;
+use crate::stereo::StereoLook;
 
 /// The stored hits and the view of an eye.
 #[derive(Debug)]
@@ -24,6 +27,10 @@ pub(crate) struct EyeHits {
     clear: Vec<f32>,
     fragments: Fragments,
     pixels: Vec<[u8; 4]>,
+    /// The tiles that the last picture drew anew.
+    tiles: Tiles,
+    /// What the pixels show; `None` if they hold for no other picture.
+    drawn: Option<LastPicture>,
     /// The edges of the last picture, once they are smoothed.
     edges: Option<Edges>,
 }
@@ -42,6 +49,8 @@ impl EyeHits {
             clear: Vec::new(),
             fragments: Fragments::of(width, height),
             pixels: vec![[0; 4]; width * height],
+            tiles: Tiles::of([width, height]),
+            drawn: None,
             edges: None,
         }
     }
@@ -56,14 +65,31 @@ impl EyeHits {
         items: &[Item],
         threads: usize,
     ) -> u32 {
+        let size = self.size.map(|n| n as usize);
         self.edges = None;
-        let pixels_cast = self.cast(inputs, show_bone, view, threads);
-        self.fragments.draw(brain, view, inputs.scene.brain_cut, threads);
-        self.light(inputs, brain, view, threads);
+        let mut drawn = LastPicture::of(inputs, brain.is_some(), view, items, size);
+        let before =
+            self.drawn.take().filter(|before| drawn.may_follow(before) && brain.is_none_or(|brain| !brain.changes.all));
+        self.tiles.fill(before.is_none());
+        let part = self.cast(inputs, show_bone, view, threads);
+        if let Some([x, y, w, h]) = part.map(|part| part.map(|n| n as usize)) {
+            self.tiles.mark_rectangle([x, y, x + w, y + h]);
+        }
+        let known = before.is_some().then_some(&mut self.tiles);
+        self.fragments.draw(brain, view, inputs.scene.brain_cut, threads, known);
+        if let Some(before) = &before {
+            drawn.mark(before, &mut self.tiles);
+        }
+        if inputs.bricks.casting.sparse {
+            self.tiles.grow();
+        }
+        drawn.measure(before, &self.tiles, &self.rays, &self.fragments, self.tiles.threads(threads));
+        self.light(inputs, brain, &drawn.tools, self.tiles.threads(threads));
+        self.drawn = Some(drawn);
         let (rays, fragments) = (&self.rays, &self.fragments);
         let depth = |at: usize| rays[at].t.min(fragments.t(brain, at));
         items.iter().for_each(|item| overlay::draw(item, inputs.scene, view, &mut self.pixels, depth));
-        pixels_cast
+        part.map_or(0, |[_, _, w, h]| w * h)
     }
 
     /// Whether all samples of the edges are taken.
@@ -89,7 +115,9 @@ impl EyeHits {
         threads: usize,
     ) {
         let Some(mut edges) = self.edges.take() else { return };
-        self.fragments.draw(brain, view, inputs.scene.brain_cut, threads);
+        self.drawn = None;
+        self.tiles.fill(true);
+        self.fragments.draw(brain, view, inputs.scene.brain_cut, threads, None);
         let [width, height] = self.size.map(|n| n as usize);
         let (bricks, scene, fragments) = (inputs.bricks, inputs.scene, &self.fragments);
         let tools = scene.tools.map(|tool| overlay::rectangle(&tool, view, [width, height]));
@@ -119,14 +147,15 @@ impl EyeHits {
         self.edges = Some(edges);
     }
 
-    fn cast(&mut self, inputs: &Inputs, shown: bool, view: &View, threads: usize) -> u32 {
+    /// Casts the rays that may see a change; returns their rectangle.
+    fn cast(&mut self, inputs: &Inputs, shown: bool, view: &View, threads: usize) -> Option<[u32; 4]> {
         let (bricks, scene) = (inputs.bricks, inputs.scene);
         if !shown || !bricks.is_some() {
             self.rays.fill(Ray::NONE);
             self.recast.forget();
-            return 0;
+            return None;
         }
-        let Some(part) = self.recast.part(view, scene.bone_cut, self.size) else { return 0 };
+        let part = self.recast.part(view, scene.bone_cut, self.size)?;
         let [x, y, w, h] = part.map(|n| n as usize);
         let [columns, lines] = [w, h].map(|n| n.div_ceil(TILE));
         self.clear.resize(columns * lines, 0.0);
@@ -141,33 +170,34 @@ impl EyeHits {
         let width = self.size[0] as usize;
         if bricks.casting.sparse && part[2..] == self.size[..] {
             let between = |at, around: &[Ray]| Ray::between(scene, at, around);
-            rows::sparsely(threads, &mut self.rays, width, exact, between);
+            let mut tiles = Tiles::of([w, h]);
+            tiles.fill(true);
+            rows::sparsely(threads, &mut self.rays, width, &tiles, exact, between);
         } else {
             rows::share(threads, rows::of(&mut self.rays, width, y..y + h, x..x + w), |y, row| {
                 row.iter_mut().enumerate().for_each(|(n, ray)| *ray = exact([x + n, y], &[]));
             });
         }
-        part[2] * part[3]
+        Some(part)
     }
 
-    /// Shades every pixel.
-    fn light(&mut self, inputs: &Inputs, brain: Option<&Border>, view: &View, threads: usize) {
+    /// Shades every pixel of marked tiles.
+    fn light(&mut self, inputs: &Inputs, brain: Option<&Border>, tools: &[Tiles; 2], threads: usize) {
         let [width, height] = self.size.map(|n| n as usize);
-        let (rays, fragments, scene) = (&self.rays, &self.fragments, inputs.scene);
-        let tools = scene.tools.map(|tool| overlay::rectangle(&tool, view, [width, height]));
-        let near = |at: [usize; 2]| tools.map(|tool| overlay::inside(tool, at));
+        let (rays, fragments, tiles) = (&self.rays, &self.fragments, &self.tiles);
+        let near = |at: [usize; 2]| near(tools, at);
         let exact = |[x, y]: [usize; 2], _: &[[u8; 4]]| {
             let at = x + width * y;
             light::fragment(inputs, [x, y], near([x, y]), &rays[at], &fragments.at(brain, at))
         };
         if !inputs.bricks.casting.sparse {
             return rows::share(threads, rows::of(&mut self.pixels, width, 0..height, 0..width), |y, row| {
-                row.iter_mut().enumerate().for_each(|(x, pixel)| *pixel = exact([x, y], &[]));
+                tiles.spans(y).flatten().for_each(|x| row[x] = exact([x, y], &[]));
             });
         }
         // Interpolates between colours of smooth, unoccluded bone.
         let bone = |at: usize| rays[at].t < fragments.t(brain, at);
-        rows::sparsely(threads, &mut self.pixels, width, exact, |[x, y], around| {
+        rows::sparsely(threads, &mut self.pixels, width, tiles, exact, |[x, y], around| {
             let at = x + width * y;
             let (aside, off) = (x % 2, y % 2 * width);
             let corners = || [at - aside - off, at + aside - off, at - aside + off, at + aside + off];
@@ -177,20 +207,30 @@ impl EyeHits {
         });
     }
 
-    /// Enlarges the view into the picture; for an anaglyph, only green and blue, over the other
-    /// eye's luminance.
-    pub fn show(&self, picture: &mut Image, in_one: bool, threads: usize) {
+    /// Enlarges what was drawn anew into the picture; for an anaglyph all, and only green and blue,
+    /// over the other eye's luminance.
+    pub fn show(&mut self, picture: &mut Image, look: Option<StereoLook>, is_second: bool, threads: usize) {
         let [x, y, width, height] = self.area.map(|n| n as usize);
         let wide = picture.width as usize;
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut picture.rgba);
         let enlarge = Enlarge::of(&self.pixels, self.size, [self.area[2], self.area[3]]);
-        rows::share(threads, rows::of(pixels, wide, y..y + height, x..x + width), |at, row| {
-            if in_one {
+        let in_one = look == Some(StereoLook::Anaglyph);
+        if in_one {
+            self.tiles.fill(true);
+        }
+        let tiles = &self.tiles;
+        rows::share(tiles.threads(threads), rows::of(pixels, wide, y..y + height, x..x + width), |at, row| {
+            if in_one && is_second {
                 let mut seen = vec![[0; 4]; width];
-                enlarge.row(at - y, &mut seen);
+                enlarge.row(at - y, 0..width, &mut seen);
                 row.iter_mut().zip(seen).for_each(|(pixel, seen)| *pixel = anaglyph(*pixel, seen));
-            } else {
-                enlarge.row(at - y, row);
+                return;
+            }
+            let [first, second] = enlarge.between(at - y);
+            let beyond = (first / EDGE != second / EDGE).then_some(second);
+            for columns in [first].into_iter().chain(beyond).flat_map(|line| tiles.spans(line)) {
+                let columns = enlarge.reached(columns);
+                enlarge.row(at - y, columns.clone(), &mut row[columns]);
             }
         });
     }

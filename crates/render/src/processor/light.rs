@@ -69,11 +69,14 @@ fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, bone: &Ray) -> Vec3 {
     lit(scene, colour, bone.normal, along, bone.open, key, 0.06 + 0.4 * wet)
 }
 
+/// Distance from the burr up to which bone is wet, mm, numerical.
+pub(crate) const WET_MM: f32 = 7.0;
+
 /// Wetness of bone: while the burr turns, a film of water and blood covers its surroundings.
 fn wetness(scene: &Scene, point: Vec3) -> f32 {
     let tip = scene.tools[0].tip;
     let away = point.distance(tip.truncate()) - tip.w;
-    scene.light.w * (1.0 - smoothstep(1.0, 7.0, away))
+    scene.light.w * (1.0 - smoothstep(1.0, WET_MM, away))
 }
 
 /// Whether there is a grain of bone dust at a point: one cell of 0.5 mm in twelve.
@@ -155,15 +158,26 @@ fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
     if tip.w < 0.0 {
         return 1.0;
     }
+    gaps(light, point, tip, tail).into_iter().map(|[gap, way]| pass_by(gap, way)).product()
+}
+
+/// Whether a tool may take light from a point of a ball.
+pub(crate) fn is_shaded(light: Vec3, middle: Vec3, radius_mm: f32, tool: &ToolShape) -> bool {
+    let is_near = |[gap, way]: [f32; 2]| gap - radius_mm < 0.10 * (way + radius_mm) + 0.3;
+    tool.tip.w >= 0.0 && gaps(light, middle, tool.tip, tool.tail).into_iter().any(is_near)
+}
+
+/// Distances of a tool's ball and shaft from the beam to a point, and how far along it they are.
+fn gaps(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> [[f32; 2]; 2] {
     let to = tip.truncate() - point;
     let way = to.dot(light).max(0.0);
-    let by_ball = pass_by((to - way * light).length() - tip.w, way);
+    let by_ball = [(to - way * light).length() - tip.w, way];
     let axis = (tail - tip).truncate();
     let (b, c, d) = (light.dot(axis), axis.length_squared(), -light.dot(to));
     let on_axis = ((-axis.dot(to) - b * d) / (c - b * b).max(1e-6)).clamp(0.0, 1.0);
     let on_beam = (b * on_axis - d).max(0.0);
     let gap = (on_beam * light - to - on_axis * axis).length() - tail.w;
-    by_ball * pass_by(gap, on_beam)
+    [by_ball, [gap, on_beam]]
 }
 
 /// Densities up to which a cut face is diploe, and from which on a table, HU, numerical.
@@ -210,7 +224,10 @@ fn cut_colour(scene: &Scene, mri: Option<&Signals>, rest: Vec3) -> Vec3 {
 /// Mark and grey value within the window at texture coordinates, 0 to 1.
 pub(crate) fn signal(scene: &Scene, signals: &Signals, at: Vec3) -> Vec4 {
     let voxel = at * Vec3::from(signals.dims.map(|n| n as f32)) - 0.5;
-    let signal = trilinear(signals.dims, voxel, |n| Vec4::from(signals.texels[n].map(f32::from))) / 255.0;
+    let signal = match signals.is_marked {
+        true => trilinear(signals.dims, voxel, |n| Vec4::from(signals.texels[n].map(f32::from))) / 255.0,
+        false => Vec4::W * (trilinear(signals.dims, voxel, |n| f32::from(signals.texels[n][3])) / 255.0),
+    };
     signal.with_w(((signal.w - scene.mri_window.x) * scene.mri_window.y).clamp(0.0, 1.0))
 }
 

@@ -6,13 +6,14 @@
 //! reference for the shaders, and the renderer for machines without a driver.
 //!
 //! # Practice
-//! Rows are shared between as many threads as there are processors. Three optimisations are not in
-//! the shaders. Each tile of 8x8 pixels first advances as one beam to where bone may be. Rays skip
-//! by the octant of their direction and test a cell only if its occupancy bit is set (`bricks.rs`).
-//! While the camera moves, rays are sparse ([`Casting::sparse`]): a quarter of the pixels, and the
-//! others where neighbouring tangent planes disagree (`skull.rs`). The hits of the last picture are
-//! kept, as on the device. At rest edges are smoothed (`edges.rs`). Triangles of the brain that
-//! reach behind the eye are skipped.
+//! Rows are shared between as many threads as there are processors. Four optimisations are not in
+//! the shaders. While the camera stands still only tiles in which something changed are drawn
+//! again, and slices only while what they show changes (`reuse.rs`). Each tile of 8x8 pixels first
+//! advances as one beam to where bone may be. Rays skip by the octant of their direction and test
+//! a cell only if its occupancy bit is set (`bricks.rs`). While the camera moves, rays are sparse
+//! ([`Casting::sparse`]): a quarter of the pixels, and the others where neighbouring tangent
+//! planes disagree (`skull.rs`). The hits of the last picture are kept, as on the device. At rest
+//! edges are smoothed (`edges.rs`). Triangles of the brain that reach behind the eye are skipped.
 //!
 //! # When not to use it
 //! Where there is a graphics card: it draws the same picture and serves the window.
@@ -26,17 +27,19 @@ mod eye;
 mod light;
 mod line;
 mod overlay;
+mod reuse;
 mod root;
 mod rows;
 mod section;
 mod skull;
 mod slice;
+mod tiles;
 mod tool;
 
 use crate::RenderError;
 use crate::border::Border;
 use crate::camera::View;
-use crate::frame::{Frame, SceneData};
+use crate::frame::{Frame, SceneData, SliceLook};
 use crate::image::Image;
 use crate::kept::SceneCache;
 use crate::layout::Layout;
@@ -47,6 +50,7 @@ use crate::report::{BRICKS_PER_FRAME, DrawReport, Hit, LEAST_DETAIL, eye_view};
 use crate::scene::Scene;
 use crate::slice::Plane;
 use crate::stereo::StereoLook;
+use crate::tool::ToolShape;
 pub use bricks::Casting;
 
 use bricks::Bricks;
@@ -74,6 +78,8 @@ pub struct ProcessorRenderer {
     turn: usize,
     /// Whether no slice was drawn yet in this size.
     fresh: bool,
+    /// What the slices show, and how many of them are still to show it.
+    shown: (Option<SliceState>, usize),
     /// Most changed bricks processed per picture; the rest follows in the next pictures.
     pub bricks_per_frame: usize,
     /// Slices drawn per picture, in turn; the others stay as they are. All three by default.
@@ -81,6 +87,9 @@ pub struct ProcessorRenderer {
     /// Threads that share the rows of a picture; by default one per processor.
     pub threads: usize,
 }
+
+/// What slices show, but for brain and bone.
+type SliceState = ([Plane; 3], SliceLook, [ToolShape; 2]);
 
 /// The inputs of the passes.
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +121,7 @@ impl ProcessorRenderer {
             detail: 1.0,
             turn: 0,
             fresh: true,
+            shown: (None, 0),
             bricks_per_frame: BRICKS_PER_FRAME,
             slices_per_frame: 3,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
@@ -166,8 +176,8 @@ impl ProcessorRenderer {
         if let Some(brain) = &mut self.brain {
             brain.leave_out(frame.brain_gone, frame.brain_splits);
             brain.cover(frame.dura.as_ref())?;
-            brain.follow(frame.brain_positions, &frame.balls())?;
             brain.stain(frame.brain_stains);
+            brain.follow(frame.brain_positions, &frame.balls())?;
         }
         let (items, lines_left) = items(&frame.overlay, self.view(frame).eye);
         let mri_from_world = self.mri.as_ref().map(|m| m.texture_from_world);
@@ -180,13 +190,13 @@ impl ProcessorRenderer {
             let inputs = self.inputs(frame, &scene);
             let brain = self.brain.as_ref().filter(|_| frame.show_brain);
             pixels_cast += eye.draw(&inputs, brain, frame.show_bone, &view, &items, self.threads);
-            let in_one = n > 0 && frame.stereo.is_some_and(|s| s.look == StereoLook::Anaglyph);
-            eye.show(&mut self.picture, in_one, self.threads);
+            eye.show(&mut self.picture, self.stereo, n > 0, self.threads);
             if n == 0 {
-                self.slices(frame, &scene);
+                self.slices(frame, &scene, followed.bricks > 0);
             }
         }
         self.eyes = eyes;
+        self.brain.iter_mut().for_each(Border::settle);
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
     }
 
@@ -202,7 +212,7 @@ impl ProcessorRenderer {
                 let (items, _) = items(&frame.overlay, view.eye);
                 let brain = self.brain.as_ref().filter(|_| frame.show_brain);
                 eye.refine(&self.inputs(frame, &scene), brain, frame.show_bone, &view, &items, self.threads);
-                eye.show(&mut self.picture, false, self.threads);
+                eye.show(&mut self.picture, None, false, self.threads);
                 true
             }
             _ => false,
@@ -221,17 +231,23 @@ impl ProcessorRenderer {
         Inputs { scene, bricks: &self.bricks, mri: self.mri.as_deref(), bone_paint, brain_paint }
     }
 
-    fn slices(&mut self, frame: &Frame, scene: &Scene) {
+    fn slices(&mut self, frame: &Frame, scene: &Scene, drilled: bool) {
         let Some(rectangles) = self.layout.slices else { return };
         let through = frame.focus(self.bounds);
         let look = frame.slices.with_bone(self.bricks.is_some());
         let planes = Plane::three(through, self.bounds, frame.slices.half_height_mm, &rectangles);
+        let state = Some((planes, look, scene.tools));
+        let (was, due) = std::mem::replace(&mut self.shown, (state, 0));
+        let fresh = std::mem::take(&mut self.fresh);
+        let moves = self.brain.as_ref().is_some_and(|brain| brain.changes.all || !brain.changes.triangles.is_empty());
+        let due = if was != state || fresh || drilled || moves { 3 } else { due };
+        let count = due.min(if fresh { 3 } else { self.slices_per_frame });
+        self.shown.1 = due - count;
         let (bricks, mri, width) = (&self.bricks, self.mri.as_deref(), self.picture.width as usize);
         let inputs = Inputs { scene, bricks, mri, bone_paint: None, brain_paint: None };
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut self.picture.rgba);
         let first = self.turn;
-        self.turn = (first + self.slices_per_frame) % 3;
-        let count = if std::mem::take(&mut self.fresh) { 3 } else { self.slices_per_frame.min(3) };
+        self.turn = (first + count) % 3;
         for n in (first..first + count).map(|n| n % 3) {
             let (plane, rectangle) = (&planes[n], &rectangles[n]);
             let [x, y, w, h] = rectangle.map(|n| n as usize);
@@ -300,6 +316,7 @@ impl ProcessorRenderer {
 
 /// Converts a colour from 0 to 1 to bytes, rounded like on the device.
 pub(crate) fn bytes(colour: Vec3) -> [u8; 4] {
-    let [r, g, b] = (colour.clamp(Vec3::ZERO, Vec3::ONE) * 255.0).round().to_array();
+    // The library's `round` is a call.
+    let [r, g, b] = (colour.clamp(Vec3::ZERO, Vec3::ONE) * 255.0 + 0.5).to_array();
     [r as u8, g as u8, b as u8, 255]
 }

@@ -1,5 +1,6 @@
 //! Distributes the rows of a picture over threads.
 
+use super::tiles::Tiles;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
@@ -40,11 +41,13 @@ pub(crate) fn share<'a, T: Send + 'a>(
 
 /// Fills a grid from `exact` values at every second column and row, interpolating the others with
 /// `between`.
-/// Where `between` returns nothing, `exact` is called with the surrounding values.
+/// Where `between` returns nothing, `exact` is called with the surrounding values. Only marked
+/// tiles are filled.
 pub(crate) fn sparsely<T: Copy + Send + Sync>(
     threads: usize,
     grid: &mut [T],
     width: usize,
+    tiles: &Tiles,
     exact: impl Fn([usize; 2], &[T]) -> T + Sync,
     between: impl Fn([usize; 2], &[T]) -> Option<T> + Sync,
 ) {
@@ -53,8 +56,9 @@ pub(crate) fn sparsely<T: Copy + Send + Sync>(
     let (mut first, second): (Vec<_>, Vec<_>) = rows.partition(|(y, _)| y % 2 == 0 || y + 1 == height);
     let fill = |at, around: &[T]| between(at, around).unwrap_or_else(|| exact(at, around));
     share(threads, first.iter_mut().map(|(y, row)| (*y, &mut **row)), |y, row| {
-        (0..width).step_by(2).for_each(|x| row[x] = exact([x, y], &[]));
-        for x in (1..width).step_by(2) {
+        // Spans begin at even columns; the first of the next one may be needed before its turn.
+        tiles.spans(y).for_each(|span| span.step_by(2).for_each(|x| row[x] = exact([x, y], &[])));
+        for x in tiles.spans(y).flat_map(|span| span.skip(1).step_by(2)) {
             row[x] =
                 if x + 1 < width && y % 2 == 0 { fill([x, y], &[row[x - 1], row[x + 1]]) } else { exact([x, y], &[]) };
         }
@@ -62,7 +66,7 @@ pub(crate) fn sparsely<T: Copy + Send + Sync>(
     let first: Vec<&[T]> = first.into_iter().map(|(_, row)| &*row).collect();
     share(threads, second.into_iter(), |y, row| {
         let [above, below] = [first[y / 2], first[y / 2 + 1]];
-        for x in 0..width {
+        for x in tiles.spans(y).flatten() {
             row[x] = match x % 2 {
                 0 => fill([x, y], &[above[x], below[x]]),
                 _ if x + 1 == width => exact([x, y], &[]),
@@ -99,14 +103,16 @@ mod tests {
                 (3 * x + 5 * y) as f32
             };
             let mean = |_, around: &[f32]| Some(around.iter().sum::<f32>() / around.len() as f32);
+            let mut tiles = Tiles::of([width, height]);
+            tiles.fill(true);
             let mut grid = vec![-1.0; width * height];
-            sparsely(2, &mut grid, width, |at, _| plane(at), mean);
+            sparsely(2, &mut grid, width, &tiles, |at, _| plane(at), mean);
             assert!(grid.iter().enumerate().all(|(at, &v)| v == plane([at % width, at / width])), "{width}x{height}");
             // A quarter, and the last row and column where their number is even.
             let few = width.div_ceil(2) * height.div_ceil(2) + width + height;
             assert!(asked.load(Ordering::Relaxed) - width * height <= few, "{width}x{height}");
             let mut exact = vec![-1.0; width * height];
-            sparsely(3, &mut exact, width, |at, _| plane(at), |_, _| None);
+            sparsely(3, &mut exact, width, &tiles, |at, _| plane(at), |_, _| None);
             assert_eq!(exact, grid);
         }
     }
