@@ -109,7 +109,8 @@ impl<S: Session, D: Draws> Window<S, D> {
         self.update(ui, shared);
         let widest = 0.5 * ui.available_width();
         let side = egui::Panel::right("panel").default_size(PANEL_WIDTH.min(widest));
-        side.size_range(PANEL_LEAST.min(widest)..=widest).show(ui, |ui| {
+        let frame = panel::frame(ui);
+        side.size_range(PANEL_LEAST.min(widest)..=widest).frame(frame).show(ui, |ui| {
             let filming = self.captures.filming();
             self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, &mut self.hand, filming);
         });
@@ -377,5 +378,9 @@ impl<S: Session, D: Draws> eframe::App for Window<S, D> {
         if self.over {
             ui.send_viewport_cmd(egui::ViewportCommand::Close);
         }
+    }
+
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        panel::background(visuals)
     }
 }

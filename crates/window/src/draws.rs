@@ -1,5 +1,6 @@
 //! The renderers that a window can use.
 
+use std::borrow::Cow;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, Texture};
 use trepan_render::{Frame, Image, Painter, RenderError, Renderer, View};
@@ -36,7 +37,7 @@ pub trait Draws {
 
     /// Like [`draw`](Self::draw), but returns a finished picture for a window on another device. It
     /// may have fewer pixels.
-    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError>;
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Cow<'_, Image>), RenderError>;
 
     /// Smooths the edges of the last picture by one more sample. With `copied` returns the finished
     /// picture.
@@ -72,9 +73,9 @@ impl Draws for Renderer {
         Some(Renderer::texture(self))
     }
 
-    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Cow<'_, Image>), RenderError> {
         let view = Draws::draw(self, frame, size, detail)?;
-        Ok((view, self.image()?))
+        Ok((view, Cow::Owned(self.image()?)))
     }
 
     fn refine(&mut self, frame: &Frame, copied: bool) -> Result<Refined, RenderError> {
@@ -114,10 +115,10 @@ impl Draws for Painter {
         self.renderer().map(Renderer::texture)
     }
 
-    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Cow<'_, Image>), RenderError> {
         self.fit(size, detail)?;
-        let (image, _) = Painter::picture(self, frame)?;
-        Ok((self.view(frame), image))
+        let view = self.view(frame);
+        Painter::draw(self, frame).map(|(image, _)| (view, image))
     }
 
     fn refine(&mut self, frame: &Frame, copied: bool) -> Result<Refined, RenderError> {

@@ -263,6 +263,10 @@ impl<H: Host> eframe::App for Pages<H> {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         self.show(ui, frame.wgpu_render_state());
     }
+
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        crate::panel::background(visuals)
+    }
 }
 
 #[cfg(test)]

@@ -39,6 +39,16 @@ impl Default for Traces {
     }
 }
 
+/// Colour to which the window is cleared: the panels'.
+pub(crate) fn background(visuals: &egui::Visuals) -> [f32; 4] {
+    visuals.panel_fill.to_normalized_gamma_f32()
+}
+
+/// Margins of a panel over the cleared window. A software driver takes 17 ms to fill one.
+pub(crate) fn frame(ui: &egui::Ui) -> egui::Frame {
+    egui::Frame::side_top_panel(ui.style()).fill(Color32::TRANSPARENT)
+}
+
 /// Shows the panel, the task first; returns the clicks. `filming` is whether screenshots are being
 /// recorded.
 pub(crate) fn show(
@@ -50,7 +60,8 @@ pub(crate) fn show(
     filming: bool,
 ) -> Clicks {
     let mut clicks = Clicks::default();
-    egui::Panel::bottom("end").resizable(false).show(ui, |ui| {
+    let end = egui::Panel::bottom("end").resizable(false).frame(frame(ui));
+    end.show(ui, |ui| {
         ui.add_space(4.0);
         let name = if panel.timeline.is_some() { "Close the replay" } else { "End the operation" };
         let end =

@@ -2,9 +2,10 @@
 //!
 //! # Practice
 //! While the camera, a tool, the brain or the bone moves, the fraction of pixels follows the frame
-//! time: coarser when it is too long, finer when there is time. After a short rest one picture with
-//! every pixel is drawn, then its edges are smoothed sample by sample, then nothing until something
-//! moves again.
+//! time: coarser when it is too long, finer when there is time. Before a camera that stands still
+//! the processor draws only what changed, so there is a fraction of its own for that. After a short
+//! rest one picture with every pixel is drawn, then its edges are smoothed sample by sample, then
+//! nothing until something moves again.
 
 use crate::Pace;
 use glam::Vec3;
@@ -26,6 +27,9 @@ const FAST_S: f64 = 0.85 * SLOW_S;
 
 /// A numerical parameter: time for drawing below which fewer pixels would not help, s.
 const SHORT_S: f64 = 0.018;
+
+/// A numerical parameter: share of the time between pictures below which drawing is short.
+const SHORT_SHARE: f64 = 0.33;
 
 /// Consecutive slow pictures before the picture gets coarser.
 const PATIENCE_SLOW: u32 = 2;
@@ -69,7 +73,10 @@ enum Rest {
 /// The current resolution level, and what moves.
 #[derive(Debug, Default)]
 pub(crate) struct Quality {
-    level: usize,
+    /// Of [`DETAILS`], while the view moves and while it stands still.
+    levels: [usize; 2],
+    /// Which of them counts.
+    stands: usize,
     slow: u32,
     fast: u32,
     /// Fast pictures needed for a finer one.
@@ -94,7 +101,7 @@ impl Quality {
     pub fn new(software: bool, detail: f32) -> Self {
         let wanted = DETAILS.iter().position(|&d| d <= detail).unwrap_or(DETAILS.len() - 1);
         let (level, patience) = (wanted.max(if software { 3 } else { 0 }), PATIENCE_FAST[0]);
-        Self { level, patience, since_finer: u32::MAX, ..Self::default() }
+        Self { levels: [level; 2], patience, since_finer: u32::MAX, ..Self::default() }
     }
 
     /// Chooses the next step for a frame in an area of `size` pixels at a time, s; `pending` says
@@ -102,6 +109,10 @@ impl Quality {
     pub fn step(&mut self, frame: &Frame, size: [u32; 2], pending: bool, now: f64) -> Step {
         let moved = pending || frame.drilling || self.seen.as_ref().is_none_or(|seen| seen.differs(frame, size));
         if moved {
+            let stands = self.seen.as_ref().is_some_and(|seen| seen.size == size && seen.fixed == fixed(frame));
+            if usize::from(stands) != std::mem::replace(&mut self.stands, stands.into()) {
+                (self.slow, self.fast, self.paced) = (0, 0, false);
+            }
             self.seen = Some(PictureState::of(frame, size));
             (self.moved_at, self.rest) = (now, Rest::Moving);
             return Step::Draw(self.detail());
@@ -135,22 +146,25 @@ impl Quality {
         self.pace = Some(Pace { interval_s: interval, detail: self.detail() });
         self.interval_s += (interval - self.interval_s) * if self.interval_s == 0.0 { 1.0 } else { 0.15 };
         // Where drawing is short, others keep the window waiting: fewer pixels would not help.
-        self.slow = if interval > SLOW_S && drawing_s > SHORT_S { self.slow + 1 } else { 0 };
+        let short = SHORT_S.max(SHORT_SHARE * interval);
+        self.slow = if interval > SLOW_S && drawing_s > short { self.slow + 1 } else { 0 };
         self.fast = if interval < FAST_S { self.fast + 1 } else { 0 };
         self.since_finer = self.since_finer.saturating_add(1);
         if self.slow >= PATIENCE_SLOW {
             let in_vain = self.since_finer < PATIENCE_FAST[0];
             self.patience = if in_vain { (2 * self.patience).min(PATIENCE_FAST[1]) } else { PATIENCE_FAST[0] };
-            self.level = (self.level + 1 + usize::from(interval > VERY_SLOW_S)).min(DETAILS.len() - 1);
+            let level = &mut self.levels[self.stands];
+            *level = (*level + 1 + usize::from(interval > VERY_SLOW_S)).min(DETAILS.len() - 1);
             (self.slow, self.fast) = (0, 0);
-        } else if self.fast >= self.patience && self.level > 0 {
-            (self.level, self.slow, self.fast, self.since_finer) = (self.level - 1, 0, 0, 0);
+        } else if self.fast >= self.patience && self.levels[self.stands] > 0 {
+            self.levels[self.stands] -= 1;
+            (self.slow, self.fast, self.since_finer) = (0, 0, 0);
         }
     }
 
     /// Fraction of the 3-D view's pixels along an edge while something moves.
     pub fn detail(&self) -> f32 {
-        DETAILS[self.level]
+        DETAILS[self.levels[self.stands]]
     }
 
     /// Highest rate of the window, Hz: low while nothing moves. Without a graphics card even the

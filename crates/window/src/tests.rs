@@ -7,6 +7,7 @@ use eframe::egui::{self, Color32, Event, Key, PointerButton, ViewportCommand};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, LazyRenderer};
 use glam::Vec3;
+use std::borrow::Cow;
 use std::sync::Arc;
 use trepan_bone::BoneVolume;
 use trepan_geometry::{Aabb, Tool};
@@ -66,7 +67,7 @@ impl Draws for TestPainter {
         self.0.bounds()
     }
 
-    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Cow<'_, Image>), RenderError> {
         let &Frame { show_bone: bone, show_brain: brain, slices, camera, .. } = frame;
         self.1 = Some(Requested { bone, brain, slices, camera, size });
         Draws::picture(&mut self.0, frame, [160, 120], detail)
