@@ -15,6 +15,10 @@ use trepan_render::{Camera, Cut, Frame, SliceLook, Stereo};
 /// Selectable fractions of the 3-D view's pixels along an edge.
 const DETAILS: [f32; 7] = [1.0, 0.75, 0.55, 0.4, 0.3, 0.22, 0.16];
 
+/// Coarsest of them before a view that stands still, drawn by the processor. It draws only what
+/// changed there, so that fewer pixels save little.
+const COARSEST_STANDING: usize = 2;
+
 /// A numerical parameter: frame time above which the picture is too slow, s: 15 pictures a second
 /// with some room.
 const SLOW_S: f64 = 0.058;
@@ -77,6 +81,8 @@ pub(crate) struct Quality {
     levels: [usize; 2],
     /// Which of them counts.
     stands: usize,
+    /// The last that may be chosen, for each.
+    coarsest: [usize; 2],
     slow: u32,
     fast: u32,
     /// Fast pictures needed for a finer one.
@@ -101,7 +107,15 @@ impl Quality {
     pub fn new(software: bool, detail: f32) -> Self {
         let wanted = DETAILS.iter().position(|&d| d <= detail).unwrap_or(DETAILS.len() - 1);
         let (level, patience) = (wanted.max(if software { 3 } else { 0 }), PATIENCE_FAST[0]);
-        Self { levels: [level; 2], patience, since_finer: u32::MAX, ..Self::default() }
+        let last = DETAILS.len() - 1;
+        let coarsest = [last, if software { COARSEST_STANDING } else { last }];
+        Self {
+            levels: coarsest.map(|last| level.min(last)),
+            coarsest,
+            patience,
+            since_finer: u32::MAX,
+            ..Self::default()
+        }
     }
 
     /// Chooses the next step for a frame in an area of `size` pixels at a time, s; `pending` says
@@ -154,7 +168,7 @@ impl Quality {
             let in_vain = self.since_finer < PATIENCE_FAST[0];
             self.patience = if in_vain { (2 * self.patience).min(PATIENCE_FAST[1]) } else { PATIENCE_FAST[0] };
             let level = &mut self.levels[self.stands];
-            *level = (*level + 1 + usize::from(interval > VERY_SLOW_S)).min(DETAILS.len() - 1);
+            *level = (*level + 1 + usize::from(interval > VERY_SLOW_S)).min(self.coarsest[self.stands]);
             (self.slow, self.fast) = (0, 0);
         } else if self.fast >= self.patience && self.levels[self.stands] > 0 {
             self.levels[self.stands] -= 1;
@@ -322,6 +336,24 @@ mod tests {
     }
 
     #[test]
+    fn a_view_that_stands_keeps_half_of_its_pixels_on_the_processor() {
+        for (software, coarsest) in [(true, 0.55), (false, 0.16)] {
+            let mut quality = Quality::new(software, 1.0);
+            let mut now = 0.0;
+            for n in 0..40 {
+                let tool = Pose::from_translation(n as f32 * Vec3::X);
+                let pressing = Frame { tool: Some(Tool::burr(3.0)), world_from_tool: tool, ..frame(0) };
+                quality.step(&pressing, SIZE, false, now);
+                quality.note(0.2, now);
+                now += 0.2;
+            }
+            assert_eq!(quality.detail(), coarsest);
+            quality.step(&frame(1), SIZE, false, now);
+            assert_eq!(quality.detail(), if software { 0.4 } else { 1.0 }, "the moving view's is its own");
+        }
+    }
+
+    #[test]
     fn a_sharp_picture_between_changes_nothing() {
         let mut quality = Quality::new(false, 0.55);
         for n in 0..50u32 {
@@ -372,10 +404,12 @@ mod tests {
             Frame { overlay: arrow, ..still },
         ];
         for (n, changed) in changes.iter().enumerate() {
-            assert_eq!(quality.step(changed, SIZE, false, 1.0 + n as f64), Step::Draw(0.4), "{n}");
+            // In three of them the view is that of the one before.
+            let detail = if (2..5).contains(&n) { 0.55 } else { 0.4 };
+            assert_eq!(quality.step(changed, SIZE, false, 1.0 + n as f64), Step::Draw(detail), "{n}");
         }
         assert_eq!(quality.step(&changes[7], [64, 49], false, 9.0), Step::Draw(0.4));
-        assert_eq!(quality.step(&changes[7], [64, 49], true, 9.0), Step::Draw(0.4), "bone has changed");
+        assert_eq!(quality.step(&changes[7], [64, 49], true, 9.0), Step::Draw(0.55), "bone has changed");
         assert_eq!(quality.step(&changes[7], [64, 49], false, 9.1), Step::Keep);
     }
 
