@@ -71,9 +71,8 @@ pub trait SoftSolver: Send {
         0.0
     }
 
-    /// Goes on from the state, the fills and the stress memory of the solver that
-    /// [`cheaper`](Self::cheaper) or [`split`](Self::split) came from; of the latter with its
-    /// splits. One that has neither does nothing.
+    /// Goes on from the state, the fills and the stress memory of the solver that it was made from,
+    /// by [`cheaper`](Self::cheaper) or with its splits by [`split`](Self::split).
     fn resume(&mut self, _from: &dyn SoftSolver, _splits: &[Split]) {}
 }
 
