@@ -71,8 +71,9 @@ pub trait SoftSolver: Send {
         0.0
     }
 
-    /// Goes on from the state, the fills and the stress memory of the solver that it was made from,
-    /// by [`cheaper`](Self::cheaper) or with its splits by [`split`](Self::split).
+    /// Goes on from the state, the fills and the stress memory of the solver that made this one.
+    ///
+    /// With no splits that was [`cheaper`](Self::cheaper), else [`split`](Self::split).
     fn resume(&mut self, _from: &dyn SoftSolver, _splits: &[Split]) {}
 }
 
