@@ -18,7 +18,7 @@ use datafusion::parquet::file::metadata::KeyValue;
 use datafusion::parquet::file::reader::{FileReader, SerializedFileReader};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs::{self, File, TryLockError};
 use std::io::Read;
@@ -56,6 +56,8 @@ pub struct Exported {
     pub warnings: Vec<String>,
     /// Recordings that could not be exported, with reason and remedy.
     pub failed: Vec<String>,
+    /// Sessions of the folder that was read.
+    pub sessions: BTreeSet<String>,
 }
 
 /// A recording and the files of results beside it.
@@ -63,7 +65,7 @@ struct Source {
     path: PathBuf,
     id: String,
     bytes: u64,
-    /// Lengths of the files, which tell a changed one from an exported one.
+    /// Length of the recording and hash of the others, which tell changed files from exported ones.
     stamp: String,
     results: [Option<PathBuf>; 2],
 }
@@ -84,15 +86,19 @@ pub fn export(runs: &Path, out: &Path) -> Result<Exported> {
     let paths = recordings(runs)?;
     let failed = || format!("cannot write into {}; choose a folder that you may write to", shown(out));
     fs::create_dir_all(out).with_context(failed)?;
+    let was_ours = out.join(".lock").is_file();
     let lock = File::create(out.join(".lock")).with_context(failed)?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => bail!("another export writes into {}; wait for its end", shown(out)),
         Err(TryLockError::Error(fault)) => return Err(fault).with_context(failed),
     }
-    remove_unfinished(out)?;
+    if was_ours {
+        remove_unfinished(out)?;
+    }
     let mut exported = Exported::default();
     let sources = distinct(paths, &mut exported);
+    exported.sessions = sources.iter().map(|source| source.id.clone()).collect();
     let done: Vec<_> = sources.par_iter().map(|source| (source, session(source, out))).collect();
     for (source, done) in done {
         match done {
@@ -117,8 +123,15 @@ fn remove_unfinished(out: &Path) -> Result<()> {
     let temporary =
         list(out).filter(|path| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(".part-")));
     let partitions = TABLES[..3].iter().flat_map(|table| list(&out.join(table)));
-    let unfinished = partitions
-        .filter(|path| path.file_name().is_some_and(|session| !out.join("cases").join(session).join(PART).exists()));
+    // Folders of other names are somebody else's.
+    let is_ours = |name: &str| {
+        let id = name.strip_prefix("session=s").unwrap_or_default();
+        id.len() == 16 && id.bytes().all(|byte| byte.is_ascii_hexdigit())
+    };
+    let unfinished = partitions.filter(|path| {
+        let session = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+        is_ours(&session) && !out.join("cases").join(&*session).join(PART).exists()
+    });
     for path in temporary.chain(unfinished).filter(|path| path.is_dir()) {
         fs::remove_dir_all(&path).with_context(|| format!("cannot remove {}; remove it yourself", shown(&path)))?;
     }
@@ -134,8 +147,13 @@ fn source(path: &Path) -> Result<Source> {
     let mut id = "s".to_owned(); // Readers take digits alone for a number.
     Sha256::digest(&head).iter().take(8).for_each(|byte| _ = write!(id, "{byte:02x}"));
     let results = facts::results_of(path);
-    let length = |path: &Option<PathBuf>| path.as_ref().and_then(|path| fs::metadata(path).ok()).map_or(0, |m| m.len());
-    let stamp = format!("{bytes}:{}:{}", length(&results[0]), length(&results[1]));
+    let mut digest = Sha256::new();
+    results
+        .iter()
+        .flatten()
+        .filter_map(|path| fs::read(path).ok())
+        .for_each(|file| digest.update(Sha256::digest(file)));
+    let stamp = digest.finalize().iter().take(8).fold(format!("{bytes}:"), |text, byte| text + &format!("{byte:02x}"));
     Ok(Source { path: path.to_owned(), id, bytes, stamp, results })
 }
 
@@ -360,7 +378,8 @@ fn case_row(session: &Session, facts: &Facts, streamed: &Streamed) -> Result<Rec
         text(own(facts.participant())),
         text(own(facts.condition())),
         text(config("quality")),
-        text(config("ingredients.rigid")),
+        // With a condition it would say what that is.
+        text(config("ingredients.rigid").filter(|_| facts.condition().is_none())),
         text(facts.date.clone()),
         whole(header.seed),
         Arc::new(Float64Array::from(vec![session.seconds()])),

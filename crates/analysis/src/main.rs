@@ -178,12 +178,23 @@ fn plan(protocol: &Path, out: Option<&Path>) -> Result<()> {
 fn gather(protocol: &Protocol, runs: &Path, tables: &Path) -> Result<(Vec<Run>, Answers, Vec<String>)> {
     let (answers, wrong) = study::answers(protocol, &runs.join("answers.csv"))?;
     let tables = if query::is_tables(runs) { runs } else { tables };
+    let (mut known, mut left) = (None, Vec::new());
     if tables != runs {
-        tell(&export::export(runs, tables)?)?;
+        let exported = export::export(runs, tables)?;
+        tell(&exported)?;
+        known = Some(exported.sessions);
     }
-    let (runs, others) = study::runs(protocol, tables)?;
+    let (mut runs, others) = study::runs(protocol, tables)?;
+    if let Some(known) = known {
+        let before = runs.len();
+        runs.retain(|run| known.contains(&run.session));
+        // Those of an earlier run that are no longer in RUNS.
+        left.extend(
+            (runs.len() < before).then(|| format!("{} sessions of the tables are left out", before - runs.len())),
+        );
+    }
     let missing = study::missing(protocol, &runs, &answers);
-    Ok((runs, answers, [others, wrong, missing].concat()))
+    Ok((runs, answers, [others, wrong, missing, left].concat()))
 }
 
 fn check(protocol: &Path, runs: &Path) -> Result<()> {

@@ -121,11 +121,17 @@ impl Wound {
         self.stains.resize(nodes, 0);
         self.sums.resize(nodes, [0.0; 3]);
         for face in exposed {
-            positions.into_iter().for_each(|positions| self.bleed(face, positions, now_ms));
+            match positions {
+                Some(positions) => self.bleed(face, positions, now_ms),
+                None => self.perfusion[face as usize / 4].vessel = 0.0,
+            }
         }
     }
 
     fn bleed(&mut self, face: u32, positions: &[Vec3], now_ms: f64) {
+        if positions.len() != self.stains.len() {
+            return;
+        }
         let Perfusion { capillaries, vessel } = self.perfusion[face as usize / 4];
         let [a, b, c] = self.border.nodes(face).map(|node| positions[node as usize]);
         let area_mm2 = 0.5 * (b - a).cross(c - a).length();
@@ -314,7 +320,7 @@ impl Wound {
     pub fn restore(
         &mut self,
         words: &mut impl Iterator<Item = u64>,
-        gone: impl Iterator<Item = u32>,
+        (gone, splits): (impl Iterator<Item = u32>, &[Split]),
         later_ms: f64,
     ) -> Option<()> {
         let faces = self.border.faces() as u64;
@@ -331,10 +337,12 @@ impl Wound {
         }
         film.restore(words)?;
         let coagulated = words.next()? as u32;
-        let stains: Vec<u8> = words.take(self.stains.len()).map(|stain| stain as u8).collect();
-        if stains.len() < self.stains.len() || sources.len().max(burnt.len()) > self.border.faces() {
+        let nodes = splits.iter().map(|split| split.node as usize + 1).fold(self.stains.len(), usize::max);
+        let stains: Vec<u8> = words.take(nodes).map(|stain| stain as u8).collect();
+        if stains.len() < nodes || sources.len().max(burnt.len()) > self.border.faces() {
             return None;
         }
+        self.split(splits, None, 0.0);
         for face in gone.flat_map(|tet| self.border.remove(tet)).filter(|&face| face != NONE) {
             self.perfusion[face as usize / 4].vessel = 0.0;
         }
@@ -472,8 +480,9 @@ mod tests {
             first.step(now, &mesh.positions, Vec3::Z, Some((Vec3::new(11.0, 1.0, 2.0), 1.0, Act::Coagulate)));
         }
         first.save(&mut words);
-        let taken =
-            |wound: &mut Wound, words: &[u64]| wound.restore(&mut words.iter().copied(), gone.into_iter(), 700.0);
+        let taken = |wound: &mut Wound, words: &[u64]| {
+            wound.restore(&mut words.iter().copied(), (gone.into_iter(), &[]), 700.0)
+        };
         let mut second = new();
         taken(&mut second, &words).unwrap();
         let state = |wound: &Wound, ms: f64| {

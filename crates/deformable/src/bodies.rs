@@ -104,6 +104,11 @@ impl MeshCollision {
         Ok(Self { itself: true, ..Self::between(body, body)? })
     }
 
+    /// Nodes of the other body, of which a step takes as many.
+    pub fn nodes(&self) -> usize {
+        self.rest.len()
+    }
+
     /// Finds the nodes inside, given both bodies' moved nodes (mm; the same twice for one body);
     /// `out` is cleared and filled up to its capacity. Returns how many candidates or contacts did
     /// not fit. Arrays of another length than the meshes give no contact and count all nodes.

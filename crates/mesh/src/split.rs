@@ -135,6 +135,7 @@ impl Splitter {
             theirs.iter_mut().filter(|back| **back == tet as u32).for_each(|back| *back = NONE);
         }
         (self.nodes, self.tets) = (mesh.positions.len() as u32, mesh.tets);
+        self.side.reserve(MOST_AROUND);
         Some(())
     }
 

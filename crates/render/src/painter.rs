@@ -122,6 +122,14 @@ impl Painter {
         }
     }
 
+    /// The last picture, without a copy where the processor drew it.
+    pub fn seen(&self) -> Result<Cow<'_, Image>, RenderError> {
+        match &self.by {
+            By::Processor(processor) => Ok(Cow::Borrowed(processor.image())),
+            By::Device(renderer) => renderer.image().map(Cow::Owned),
+        }
+    }
+
     /// Whether bone has changed since the last picture.
     pub fn is_stale(&mut self) -> bool {
         match &mut self.by {

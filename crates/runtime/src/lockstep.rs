@@ -282,8 +282,12 @@ impl<'a> Replay<'a> {
         if last.is_some_and(|last| last.cheaper > 0) {
             tissue.solver.wait_for_cheaper();
         }
-        if let Some(last) = last.filter(|last| last.splits as usize > tissue.solver.splits().len()) {
-            tissue.solver.wait_for_splits(&self.load.1, last.splits as usize);
+        if let Some(last) = last.filter(|last| last.splits > 0) {
+            // Another mesh has splits of its own.
+            let wanted = if self.by_time { self.load.1.splits.len() } else { last.splits as usize };
+            if wanted > tissue.solver.splits().len() {
+                tissue.solver.wait_for_splits(&self.load.1, wanted);
+            }
         }
         let began_ms = clock.now_ms();
         let record = tissue.solver.step(&self.load.1, self.load.0);

@@ -260,8 +260,8 @@ impl Body {
         }
     }
 
-    /// Splits nodes where faces are cut; what a node is (fixed, anchored, of the membrane) its copy
-    /// is too. `None`, and no change, where a split does not fit the mesh.
+    /// Splits nodes where faces are cut: copies of fixed nodes are fixed, an anchor is shared by the
+    /// volume around each copy. `None`, and no change, where a split does not fit the mesh.
     ///
     /// Of each part that nothing holds any more one node is tied to its place by a spring that is
     /// too soft to be felt, 1e-6 N/mm: so the body passes its [check](Self::check), and the part is
@@ -269,25 +269,33 @@ impl Body {
     pub fn split(&mut self, splits: &[Split]) -> Option<()> {
         let mut mesh = self.mesh.clone();
         mesh.split(splits)?;
+        split_triangles(&self.mesh, splits, &mut self.membrane.triangles);
+        self.mesh = mesh;
         let mut copies: Vec<[u32; 2]> = splits.iter().map(|split| [split.from, split.node]).collect();
         copies.dedup();
+        let around = self.lumped_masses_scaled_g(|tet| 1.0 / f64::from(self.material(tet).density_g_mm3()));
         for [from, node] in copies {
             let held = self.fixed.contains(&from).then_some(node);
             self.fixed.extend(held);
-            let anchor = self.anchors.iter().rfind(|anchor| anchor.node == from).map(|of| Anchor { node, ..*of });
-            self.anchors.extend(anchor);
+            let [own, other] = [from, node].map(|n| around[n as usize]);
+            let Some(anchor) = self.anchors.iter_mut().rfind(|anchor| anchor.node == from) else { continue };
+            let of = |share: f64, node| {
+                let [along, across, open_mm2] =
+                    [anchor.along, anchor.across, anchor.open_mm2].map(|whole| whole * share as f32);
+                Anchor { node, along, across, open_mm2, ..*anchor }
+            };
+            let (kept, given) = (of(own / (own + other), from), of(other / (own + other), node));
+            *anchor = kept;
+            self.anchors.push(given);
         }
-        for split in splits {
-            let (tet, corner) = split.place();
-            let corners = &mut self.mesh.tets[tet];
-            let on_it = self.membrane.triangles.iter_mut().filter(|t| t.iter().all(|n| corners.contains(n)));
-            on_it.flatten().filter(|n| **n == split.from).for_each(|n| *n = split.node);
-            corners[corner] = split.node;
-        }
-        self.mesh = mesh;
         while let Err(BodyError::Loose(tet)) = self.check() {
             let node = self.mesh.tets[tet][0];
-            self.anchors.push(Anchor { node, normal: Vec3::Z, along: TIE, across: TIE, ..Anchor::default() });
+            match self.anchors.iter_mut().rfind(|anchor| anchor.node == node) {
+                Some(anchor) => (anchor.along, anchor.across) = (TIE, TIE),
+                None => {
+                    self.anchors.push(Anchor { node, normal: Vec3::Z, along: TIE, across: TIE, ..Anchor::default() });
+                }
+            }
         }
         Some(())
     }
@@ -328,6 +336,18 @@ impl Body {
     /// A tetrahedron of the first part that the fixed nodes do not hold.
     pub fn unsupported(&self) -> Option<usize> {
         self.loose(self.fixed_mask(), span_a_plane)
+    }
+}
+
+/// Lets triangles on faces of a mesh's tetrahedra, as it was before the splits, follow those.
+pub fn split_triangles(mesh: &TetMesh, splits: &[Split], triangles: &mut [[u32; 3]]) {
+    let mut tets = mesh.tets.clone();
+    for split in splits {
+        let (tet, corner) = split.place();
+        let Some(corners) = tets.get_mut(tet) else { continue };
+        let on_it = triangles.iter_mut().filter(|t| t.iter().all(|n| corners.contains(n)));
+        on_it.flatten().filter(|n| **n == split.from).for_each(|n| *n = split.node);
+        corners[corner] = split.node;
     }
 }
 
@@ -419,7 +439,8 @@ mod tests {
         let ends = |triangle: &[u32; 3]| trepan_mesh::Surface::of(&cut.mesh).triangles.contains(triangle);
         assert!(cut.membrane.triangles.iter().all(ends), "the membrane is cut too");
         let [given, copied] = [0, 1].map(|n| cut.anchors[n]);
-        assert!(copied == Anchor { node: copied.node, ..given } && copied.node >= 27 && cut.anchors.len() == 2);
+        assert!(given.along > 0.0 && copied.along > 0.0 && copied.node >= 27 && cut.anchors.len() == 2);
+        assert!((given.along + copied.along - 2.0).abs() < 1e-6, "{given:?} {copied:?}");
         let mut loose = Body { anchors: Vec::new(), ..body.clone() };
         loose.split(&splits).unwrap();
         assert!(loose.check() == Ok(()) && loose.anchors.len() == 1 && loose.anchors[0].along == TIE);

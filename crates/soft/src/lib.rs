@@ -46,7 +46,7 @@ mod stiffening;
 mod tangent;
 mod tetra;
 
-pub use body::{Body, BodyError};
+pub use body::{Body, BodyError, split_triangles};
 pub use bound::{
     element_bound_ms, element_omega2, highest_frequency, lowest_frequency, lowest_frequency_of, power_bound_ms,
     power_bound_of_ms,

@@ -85,12 +85,17 @@ impl Bleeder {
         self.tell(self.wound.rate_ml_per_min(now_ms), now);
     }
 
-    /// Follows all splits of nodes so far. Where nodes have `positions`, mm, what comes to light
+    /// Follows all splits of nodes so far, with all nodes at `positions`, mm; what comes to light
     /// bleeds.
-    pub fn split(&mut self, splits: &[Split], positions: Option<&[Vec3]>, now: &mut Bleeding) {
+    pub fn split(&mut self, splits: &[Split], positions: &[Vec3], now: &mut Bleeding) {
         let new = splits.get(self.followed..).unwrap_or_default();
-        self.followed = self.followed.max(splits.len());
-        self.wound.split(new, positions, self.last_ms);
+        self.wound.split(new, Some(positions), self.last_ms);
+        self.follows(splits.len(), now);
+    }
+
+    /// Learns how many splits the wound follows.
+    pub fn follows(&mut self, splits: usize, now: &mut Bleeding) {
+        self.followed = self.followed.max(splits);
         now.stains.resize(self.wound.stains().len(), 0);
     }
 

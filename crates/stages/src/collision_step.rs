@@ -62,13 +62,14 @@ impl CollisionStage {
             None => (step.patch, step.points_in_contact) = (SurfacePatch::default(), 0),
         }
         let couple_mm = if self.with_torque { step.patch.couple_mm } else { Vec3::ZERO };
-        let before = std::mem::replace(
-            &mut self.patches[hand],
-            SurfacePatch { tissue_ms: soft.time_ms, couple_mm, ..step.patch },
-        );
-        if self.smooth_steps > 0 {
-            slow_down(&before, &mut self.patches[hand]);
+        let patch = &mut self.patches[hand];
+        *patch = SurfacePatch { tissue_ms: soft.time_ms, couple_mm, ..step.patch };
+        let slot = tool.map(|tool| tool.slot);
+        let (was_slot, was) = self.felt[hand];
+        if self.smooth_steps > 0 && slot == was_slot {
+            slow_down(was, patch);
         }
+        self.felt[hand] = (slot, patch.force_n * patch.normal);
     }
 
     /// Lets the tool meet the dura; returns whether that is open.
@@ -90,7 +91,7 @@ impl CollisionStage {
         self.smooth_steps = SMOOTH_STEPS;
         self.loads.contact_splits = self.followed as u32;
         if let Some(bleeder) = &mut self.bleeder {
-            bleeder.split(&soft.splits, Some(&soft.positions), &mut self.wound.bleeding);
+            bleeder.split(&soft.splits, &soft.positions, &mut self.wound.bleeding);
         }
     }
 
@@ -145,15 +146,15 @@ impl CollisionStage {
     }
 }
 
-/// Steps after a cut in which a hand's force changes slowly, and its change in each, N. A lip that
-/// opens lets go of the tool within a millisecond. Numerical.
+/// Steps after a cut in which a hand's force changes slowly, and its change in each, N and as a share
+/// of the force. A lip that opens lets go of the tool within a millisecond. Numerical.
 const SMOOTH_STEPS: u32 = 100;
-const SLOW_N: f32 = 0.03;
+const SLOW: (f32, f32) = (0.03, 0.1);
 
-/// Lets the force of a patch differ from that before by [`SLOW_N`] at most.
-fn slow_down(before: &SurfacePatch, now: &mut SurfacePatch) {
-    let (was, is) = (before.force_n * before.normal, now.force_n * now.normal);
-    let force = was + (is - was).clamp_length_max(SLOW_N);
+/// Lets the tissue's force of a patch differ little from that before, N.
+fn slow_down(was: Vec3, now: &mut SurfacePatch) {
+    let is = now.force_n * now.normal;
+    let force = was + (is - was).clamp_length_max(SLOW.0.max(SLOW.1 * was.length()));
     if force != is && force.is_finite() {
         (now.force_n, now.normal) = (force.length(), force.normalize_or_zero());
     }
@@ -212,7 +213,9 @@ impl Folds {
     }
 
     fn press(&mut self, positions: &[Vec3], to: &mut NodalContacts) {
-        to.overflow += self.collision.step(positions, positions, &mut self.contacts);
+        // Copies of split nodes come after those that it knows.
+        let known = &positions[..self.collision.nodes().min(positions.len())];
+        to.overflow += self.collision.step(known, known, &mut self.contacts);
         self.contacts.iter().for_each(|contact| to.push(contact.spring(FOLD.0, FOLD.1)));
     }
 }
@@ -238,6 +241,8 @@ pub struct CollisionStage {
     wound: Wound,
     /// Of the first hand's tool, and of the second's or an arm's.
     patches: [SurfacePatch; 2],
+    /// Slot of each hand's tool in the last step, and the tissue's force on it, N, without the dura.
+    felt: [(Option<usize>, Vec3); 2],
     steps: [TissueStep; 2],
     loads: Loads,
     seq: u64,
@@ -272,6 +277,7 @@ impl CollisionStage {
             with_torque: false,
             under_pressure: false,
             patches: Default::default(),
+            felt: Default::default(),
             settling: Settling::default(),
             aspirator: None,
             scissors: None,
@@ -400,13 +406,14 @@ impl CollisionStage {
         (fills.len() == tets).then_some(())?;
         let mut dura = self.dura.as_ref().map(|membrane| membrane.dura.clone());
         dura.as_mut().map_or(Some(()), |dura| dura.restore(words, later_ms))?;
-        let splits = self.scissors.as_mut().map_or(Some(Vec::new()), |scissors| scissors.restore(words))?;
+        let mut scissors = self.scissors.clone();
+        let splits = scissors.as_mut().map_or(Some(Vec::new()), |scissors| scissors.restore(words))?;
         if let Some(bleeder) = &mut self.bleeder {
             let followed = splits.get(..words.next()? as usize)?;
-            bleeder.split(followed, None, &mut self.wound.bleeding);
             let rates = [f32::from_bits(words.next()? as u32), f32::from_bits(words.next()? as u32)];
             let gone = (0u32..).zip(&fills).filter(|(_, fill)| **fill == 0).map(|(tet, _)| tet);
-            bleeder.wound.restore(words, gone, later_ms)?;
+            bleeder.wound.restore(words, (gone, followed), later_ms)?;
+            bleeder.follows(followed.len(), &mut self.wound.bleeding);
             self.wound.bleeding.worst_ml_per_min = rates[1];
             bleeder.tell(rates[0], &mut self.wound.bleeding);
         }
@@ -414,7 +421,7 @@ impl CollisionStage {
             membrane.dura = dura;
             membrane.tell(&mut self.wound.dura);
         }
-        self.loads.splits = splits;
+        (self.scissors, self.loads.splits) = (scissors, splits);
         self.wound.cut_mm2 = self.scissors.as_ref().map_or(0.0, |scissors| scissors.cut_mm2);
         if let Some(aspirator) = &mut self.aspirator {
             self.scissors.iter().for_each(|scissors| aspirator.cut(&scissors.cuts, &fills));

@@ -35,6 +35,7 @@ pub const MOST_SPLITS: usize = 16_384;
 const SAME_CUT: (f32, f32) = (0.9, 6.0);
 
 /// Which faces of the brain are cut.
+#[derive(Clone)]
 pub(crate) struct Scissors {
     splitter: Splitter,
     /// Whether each tetrahedron may be cut.
@@ -147,7 +148,8 @@ impl Scissors {
 
     /// Appends the cuts for [`restore`](Self::restore).
     pub fn save(&self, splits: &[Split], to: &mut Vec<u64>) {
-        to.extend([self.cut_mm2.to_bits(), self.cuts.len() as u64, splits.len() as u64]);
+        let down = self.is_down.map(u64::from);
+        to.extend([self.cut_mm2.to_bits(), down[0] + 2 * down[1], self.cuts.len() as u64, splits.len() as u64]);
         to.extend(self.cuts.iter().map(|face| u64::from(*face)));
         to.extend(splits.iter().flat_map(|split| [split.corner, split.from, split.node].map(u64::from)));
         to.push(self.beside.iter().flatten().count() as u64);
@@ -159,13 +161,14 @@ impl Scissors {
 
     /// Most words that [`save`](Self::save) appends.
     pub const fn most_words() -> usize {
-        4 + MOST_CUTS + 3 * MOST_SPLITS + 4 * 2 * MOST_CUTS
+        5 + MOST_CUTS + 3 * MOST_SPLITS + 4 * 2 * MOST_CUTS
     }
 
     /// Takes over what others cut, before the first step; returns the splits. `None`, and no change
     /// that counts, if it does not fit.
     pub fn restore(&mut self, words: &mut impl Iterator<Item = u64>) -> Option<Vec<Split>> {
         let cut_mm2 = f64::from_bits(words.next()?);
+        let down = words.next()?;
         let [cuts, count] = [words.next()? as usize, words.next()? as usize];
         (cuts <= MOST_CUTS && count <= MOST_SPLITS && cut_mm2 >= 0.0).then_some(())?;
         let cuts: Vec<u32> = words.take(cuts).map(|face| face as u32).collect();
@@ -181,8 +184,10 @@ impl Scissors {
         }
         self.splitter.restore(&cuts, &splits)?;
         self.learn(&splits);
-        (self.cuts, self.cut_mm2) = (cuts, cut_mm2);
-        self.cuts.reserve(MOST_CUTS - self.cuts.len());
+        (self.cuts, self.cut_mm2, self.is_down) = (cuts, cut_mm2, [down & 1 == 1, down & 2 == 2]);
+        // A copy of these has no room.
+        self.cuts.reserve_exact(MOST_CUTS - self.cuts.len());
+        self.from.reserve_exact(MOST_SPLITS - self.from.len());
         Some(splits)
     }
 }

@@ -138,7 +138,9 @@ impl SolverStage {
         self.coming = None;
         let Some(mut solver) = made else {
             tracing::warn!("the brain's solver goes on as it was: that of its changed body was refused");
-            self.refused = self.loads.splits.len();
+            if let Coming::Split(to) = coming {
+                self.refused = to;
+            }
             return false;
         };
         let to = if let Coming::Split(to) = coming { to } else { self.splits };

@@ -12,7 +12,7 @@ use trepan_mesh::Split;
 use trepan_soft::simd::Layout;
 use trepan_soft::{
     Body, BodyError, Fluid, FreeNode, Gain, ImplicitSprings, Loads, MakeSolver, NodeState, SoftSolver, StepReport,
-    SurfacePressure,
+    SurfacePressure, split_triangles,
 };
 
 /// Total Lagrangian explicit solver of one body.
@@ -69,8 +69,9 @@ impl SoftSolver for Tled {
             return None;
         }
         let (body, pressure, fills) = (Arc::clone(&self.body), self.pressure.clone(), self.fills().to_vec());
+        let tet_at = self.base.layout.tet_at.clone();
         Some(Box::new(move || {
-            let mut solver = Self { pressure, ..Self::new(&body, &config).ok()? };
+            let mut solver = Self { pressure, ..Self::in_order(&body, &config, Some(tet_at)).ok()? };
             solver.elements.empty_to(&fills, &body, &solver.base.layout);
             Some(Box::new(solver))
         }))
@@ -86,6 +87,7 @@ impl SoftSolver for Tled {
         pressure.triangles.iter_mut().flatten().for_each(|place| *place = node_at[*place as usize]);
         Some(Box::new(move || {
             let mut body = Body::clone(&body);
+            split_triangles(&body.mesh, &splits, &mut pressure.triangles);
             body.split(&splits)?;
             let mut solver = Self::in_order(&body, &config, Some(tet_at)).ok()?;
             solver.set_pressure(pressure);

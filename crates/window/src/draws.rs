@@ -117,8 +117,9 @@ impl Draws for Painter {
 
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Cow<'_, Image>), RenderError> {
         self.fit(size, detail)?;
-        let view = self.view(frame);
-        Painter::draw(self, frame).map(|(image, _)| (view, image))
+        Painter::draw(self, frame)?;
+        // Of the parts that this picture has.
+        Ok((self.view(frame), self.seen()?))
     }
 
     fn refine(&mut self, frame: &Frame, copied: bool) -> Result<Refined, RenderError> {

@@ -216,12 +216,18 @@ impl Protocol {
         if effect.is_nan() || effect <= 0.0 || draws < 99 {
             bail!("effect = {effect}, draws = {draws}; give an effect over 0 and at least 99 draws");
         }
+        if (draws as f64 + 1.0) * alpha < 10.0 {
+            bail!("{draws} draws cannot show p under {alpha} in ten comparisons; give more than {:.0}", 10.0 / alpha);
+        }
         Ok(())
     }
 
-    /// The group of a participant's code.
+    /// The group of a planned participant's code.
     pub fn group_of(&self, code: &str) -> Option<usize> {
         let letters = code.trim_end_matches(|c: char| c.is_ascii_digit());
-        self.groups.iter().position(|group| group.code == letters)
+        let group = self.groups.iter().position(|group| group.code == letters)?;
+        let participants = self.groups[group].participants;
+        let digits = participants.to_string().len().max(2);
+        (1..=participants).any(|n| code == format!("{letters}{n:0digits$}")).then_some(group)
     }
 }

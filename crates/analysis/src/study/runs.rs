@@ -54,7 +54,7 @@ pub fn runs(protocol: &Protocol, tables: &Path) -> Result<(Vec<Run>, Vec<String>
             let (session, task) = (session.unwrap_or_default(), task.unwrap_or_default());
             let code = participant.unwrap_or_default();
             let Some(group) = protocol.group_of(&code).filter(|_| !code.is_empty()) else {
-                others.push(format!("session {session}: participant {code:?} has no group's code; is --person right?"));
+                others.push(format!("session {session}: participant {code:?} is not in the plan; is --person right?"));
                 continue;
             };
             if !protocol.tasks.iter().any(|known| known.name == task) {

@@ -104,8 +104,8 @@ impl ViewState {
         let mut panel = notice_text::panel(&self.case, self.program, view);
         for choice in &mut panel.choices {
             let tools = choice.tools.iter().zip(&mut choice.options);
-            let aspirators = tools.filter(|(tool, _)| tool.kind == ToolKind::Aspirator);
-            aspirators.for_each(|(_, (_, why_not))| *why_not = why_not.take().or(self.no_aspiration.clone()));
+            let taking = tools.filter(|(tool, _)| matches!(tool.kind, ToolKind::Aspirator | ToolKind::Scissors));
+            taking.for_each(|(_, (_, why_not))| *why_not = why_not.take().or(self.no_aspiration.clone()));
         }
         let taken_ml = self.taken_ml(brain);
         if taken_ml > 0.0 || view.sample.tool.kind == ToolKind::Aspirator {
