@@ -80,11 +80,14 @@ def test_what_cannot_be_read_stops_nothing_and_leaves_nothing(runs: Path) -> Non
     (runs / "E01-001" / "summary.json").write_text("{")
     _, told = export(runs, 1)
     assert "left out" in told and "is not a recording" in told and "is no summary" in told and "2 recordings" in told
-    left = runs.with_name("tables") / "ticks" / "session=0123456789abcdef"
+    left = runs.with_name("tables") / "ticks" / "session=s0123456789abcdef"
     left.mkdir()
+    others = left.with_name("2024")
+    others.mkdir()
     (runs.with_name("tables") / ".part-x").mkdir()
     export(runs, 1)
-    assert not left.exists() and not (runs.with_name("tables") / ".part-x").exists()
+    assert not left.exists() and not (runs.with_name("tables") / ".part-x").exists() and others.exists()
+    others.rmdir()
     for table in ("ticks", "events", "scores", "cases"):
         assert len(list((runs.with_name("tables") / table).iterdir())) == 1
 

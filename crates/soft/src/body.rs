@@ -260,8 +260,8 @@ impl Body {
         }
     }
 
-    /// Splits nodes where faces are cut: copies of fixed nodes are fixed, an anchor is shared by the
-    /// volume around each copy. `None`, and no change, where a split does not fit the mesh.
+    /// Splits nodes where faces are cut: copies of fixed nodes are fixed, an anchor is shared by
+    /// the volume around each copy. `None`, and no change, where a split does not fit the mesh.
     ///
     /// Of each part that nothing holds any more one node is tied to its place by a spring that is
     /// too soft to be felt, 1e-6 N/mm: so the body passes its [check](Self::check), and the part is

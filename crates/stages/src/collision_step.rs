@@ -146,8 +146,8 @@ impl CollisionStage {
     }
 }
 
-/// Steps after a cut in which a hand's force changes slowly, and its change in each, N and as a share
-/// of the force. A lip that opens lets go of the tool within a millisecond. Numerical.
+/// Steps after a cut in which a hand's force changes slowly, and its change in each, N and as a
+/// share of the force. A lip that opens lets go of the tool within a millisecond. Numerical.
 const SMOOTH_STEPS: u32 = 100;
 const SLOW: (f32, f32) = (0.03, 0.1);
 
@@ -241,7 +241,7 @@ pub struct CollisionStage {
     wound: Wound,
     /// Of the first hand's tool, and of the second's or an arm's.
     patches: [SurfacePatch; 2],
-    /// Slot of each hand's tool in the last step, and the tissue's force on it, N, without the dura.
+    /// Slot of each hand's tool in the last step, and the tissue's force on it without the dura, N.
     felt: [(Option<usize>, Vec3); 2],
     steps: [TissueStep; 2],
     loads: Loads,

@@ -214,7 +214,7 @@ mod tests {
             let panel = panel("c", Program::Integrated, &View { bone_open, ..view(0) });
             panel.choices[0].options.iter().filter(|(_, why_not)| why_not.is_some()).count()
         };
-        assert_eq!((closed(false), closed(true)), (5, 0), "those for the brain and the dura");
+        assert_eq!((closed(false), closed(true)), (6, 0), "those for the brain and the dura");
     }
 
     #[test]
