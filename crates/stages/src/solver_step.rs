@@ -97,6 +97,7 @@ impl SolverStage {
     }
 
     /// Has a solver of the body as it was cut by now made; it steps from when it is there.
+    /// Allocates where there are new splits.
     pub fn ask_for_splits(&mut self) {
         self.ask_for(self.loads.splits.len());
     }
