@@ -2,6 +2,7 @@
 
 use crate::Fluid;
 use glam::DVec3;
+use std::any::Any;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_mesh::{Split, TetMesh};
@@ -56,9 +57,9 @@ pub trait SoftSolver: Send {
         None
     }
 
-    /// Stress memory, in an order of its own; empty without one.
-    fn memory(&self) -> Vec<f32> {
-        Vec::new()
+    /// Stress memory, of a type of its own; `None` without one.
+    fn memory(&mut self) -> Option<&mut dyn Any> {
+        None
     }
 
     /// Present fill of each tetrahedron, in 65,535ths; empty where nothing is taken away.
@@ -71,10 +72,11 @@ pub trait SoftSolver: Send {
         0.0
     }
 
-    /// Goes on from the state, the fills and the stress memory of the solver that made this one.
+    /// Goes on from the state, the fills and the stress memory of the solver that made this one,
+    /// which loses its stress memory.
     ///
     /// With no splits that was [`cheaper`](Self::cheaper), else [`split`](Self::split).
-    fn resume(&mut self, _from: &dyn SoftSolver, _splits: &[Split]) {}
+    fn resume(&mut self, _from: &mut dyn SoftSolver, _splits: &[Split]) {}
 }
 
 /// Makes a solver on any thread; `None` if the body is refused.

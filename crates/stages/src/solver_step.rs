@@ -146,7 +146,7 @@ impl SolverStage {
         };
         let to = if let Coming::Split(to) = coming { to } else { self.splits };
         let new = &self.loads.splits[self.splits..to];
-        solver.resume(&*self.solver, new);
+        solver.resume(&mut *self.solver, new);
         solver.lower_fills(&self.loads.fills);
         for Split { from, node, .. } in new {
             if *node as usize == self.rest.len() {

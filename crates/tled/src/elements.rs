@@ -182,14 +182,10 @@ impl Elements {
         self.team.forget();
     }
 
-    /// The stress memory, part by part.
-    pub fn memory(&self) -> Vec<f32> {
-        self.team.memory()
-    }
-
-    /// Takes a stress memory of [`memory`](Self::memory); clears it for one of another length.
-    pub fn remember(&mut self, memory: &[f32]) {
-        self.team.remember(memory);
+    /// Exchanges the stress memory with that of elements in the same order; clears it part by part
+    /// where they are not.
+    pub fn take_memory(&mut self, from: &mut Self) {
+        self.team.take_memory(&mut from.team);
     }
 }
 

@@ -30,6 +30,7 @@ use crate::relaxation::{Fade, PRONY_TERMS};
 use crate::scaling::Scaling;
 use crate::sheet::{self, SheetBlock, SheetForces};
 use glam::Vec4;
+use std::any::Any;
 use std::marker::PhantomData;
 use trepan_soft::simd::Kernel;
 use trepan_soft::simd::PassReport;
@@ -99,8 +100,12 @@ trait LawElements: Send {
         out: (&mut [Quad; NODES], &mut Vec<Added>),
     ) -> PassReport;
     fn volumes(&mut self, kernel: Kernel, u: &[Quad; NODES], shares: &mut [f32; NODES]);
-    /// The stress memory.
-    fn memory(&mut self) -> &mut [f32];
+    /// The stress memory: a vector of [`Memory`], or nothing.
+    fn memory(&mut self) -> &mut dyn Any;
+    /// Clears the stress memory.
+    fn forget(&mut self);
+    /// Exchanges the stress memory; clears it for one of other elements.
+    fn take_memory(&mut self, from: &mut dyn Any);
     /// Changes the fill of an element; `number` is that of its tetrahedron or triangle.
     fn fill(&mut self, index: usize, body: &Body, number: u32, filling: Filling);
 }
@@ -239,14 +244,17 @@ impl Part {
         self.u.iter_mut().zip(&self.groups.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
     }
 
-    /// The stress memory.
-    pub fn memory(&mut self) -> &mut [f32] {
-        self.elements.memory()
+    /// Exchanges the stress memory; clears it where the other has other elements.
+    pub fn take_memory(&mut self, from: Option<&mut Self>) {
+        match from {
+            Some(from) => self.elements.take_memory(from.elements.memory()),
+            None => self.elements.forget(),
+        }
     }
 
     /// Clears the stress memory.
     pub fn forget(&mut self) {
-        self.memory().fill(0.0);
+        self.elements.forget();
         self.wake();
     }
 }
@@ -324,8 +332,19 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for 
         kernel.run(&mut Volumes { blocks: &self.blocks, u, strains: &mut self.strains, shares });
     }
 
-    fn memory(&mut self) -> &mut [f32] {
-        self.memory.as_flattened_mut().as_flattened_mut().as_flattened_mut()
+    fn memory(&mut self) -> &mut dyn Any {
+        &mut self.memory
+    }
+
+    fn forget(&mut self) {
+        self.memory.fill([[[0.0; WIDTH]; 6]; T]);
+    }
+
+    fn take_memory(&mut self, from: &mut dyn Any) {
+        match from.downcast_mut::<Vec<Memory<T>>>().filter(|from| from.len() == self.memory.len()) {
+            Some(from) => std::mem::swap(&mut self.memory, from),
+            None => self.forget(),
+        }
     }
 
     fn fill(&mut self, index: usize, body: &Body, tet: u32, Filling { share, kept }: Filling) {
@@ -353,9 +372,13 @@ impl LawElements for Sheet {
     /// A membrane has no volume.
     fn volumes(&mut self, _: Kernel, _: &[Quad; NODES], _: &mut [f32; NODES]) {}
 
-    fn memory(&mut self) -> &mut [f32] {
-        &mut []
+    fn memory(&mut self) -> &mut dyn Any {
+        self
     }
+
+    fn forget(&mut self) {}
+
+    fn take_memory(&mut self, _: &mut dyn Any) {}
 
     fn fill(&mut self, index: usize, body: &Body, triangle: u32, Filling { share, .. }: Filling) {
         let count = self.0.len();

@@ -194,25 +194,11 @@ impl Team {
         self.shared.parts.iter().for_each(|part| lock(part).forget());
     }
 
-    /// The stress memory, part by part.
-    pub fn memory(&self) -> Vec<f32> {
-        let parts = || self.shared.parts.iter();
-        let mut all = Vec::with_capacity(parts().map(|part| lock(part).memory().len()).sum());
-        parts().for_each(|part| all.extend_from_slice(lock(part).memory()));
-        all
-    }
-
-    /// Takes a stress memory of [`memory`](Self::memory); clears it for one of another length.
-    pub fn remember(&mut self, memory: &[f32]) {
-        if memory.len() != self.shared.parts.iter().map(|part| lock(part).memory().len()).sum() {
-            return self.forget();
-        }
-        let mut rest = memory;
+    /// Exchanges the stress memory part by part; clears it in parts of other elements.
+    pub fn take_memory(&mut self, from: &mut Self) {
+        let mut theirs = from.shared.parts.iter();
         for part in &self.shared.parts {
-            let mut part = lock(part);
-            let (own, others) = rest.split_at(part.memory().len());
-            part.memory().copy_from_slice(own);
-            rest = others;
+            lock(part).take_memory(theirs.next().map(lock).as_deref_mut());
         }
     }
 }

@@ -6,6 +6,7 @@ use crate::config::{Config, Damping};
 use crate::elements::Elements;
 use crate::nodes::{Nodes, Update, kick_ms};
 use crate::part::CALM;
+use std::any::Any;
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_mesh::Split;
@@ -73,6 +74,7 @@ impl SoftSolver for Tled {
         Some(Box::new(move || {
             let mut solver = Self { pressure, ..Self::in_order(&body, &config, Some(tet_at)).ok()? };
             solver.elements.empty_to(&fills, &body, &solver.base.layout);
+            solver.reset();
             Some(Box::new(solver))
         }))
     }
@@ -92,12 +94,14 @@ impl SoftSolver for Tled {
             let mut solver = Self::in_order(&body, &config, Some(tet_at)).ok()?;
             solver.set_pressure(pressure);
             solver.elements.empty_to(&fills, &body, &solver.base.layout);
+            // Its pages are touched here, on the maker's thread.
+            solver.reset();
             Some(Box::new(solver))
         }))
     }
 
-    fn memory(&self) -> Vec<f32> {
-        self.elements.memory()
+    fn memory(&mut self) -> Option<&mut dyn Any> {
+        Some(&mut self.elements)
     }
 
     fn last_step_ms(&self) -> f32 {
@@ -108,21 +112,42 @@ impl SoftSolver for Tled {
         &self.elements.fills.now
     }
 
-    /// A stress memory of another length starts anew.
-    fn resume(&mut self, from: &dyn SoftSolver, splits: &[Split]) {
-        let mut state = from.state().clone();
-        state.split(splits);
-        self.elements.empty_to(from.fills(), &self.body, &self.base.layout);
-        let nodes = self.elements.nodes();
-        for (node, &place) in self.base.layout.place_of.iter().enumerate() {
-            let is_left = self.elements.fills.is_left(node as u32);
-            let velocity = if is_left { state.velocities[node] } else { Vec3::ZERO };
-            nodes.set(place as usize, state.positions[node] - self.base.rest[node], velocity);
+    /// The stress memory of another solver starts anew.
+    fn resume(&mut self, from: &mut dyn SoftSolver, splits: &[Split]) {
+        let state = from.state();
+        let whole = state.positions.len();
+        let mut copies: Vec<usize> = Vec::with_capacity(splits.len());
+        for Split { from, node, .. } in splits {
+            if *node as usize == whole + copies.len() {
+                let from = *from as usize;
+                copies.push(copies.get(from.wrapping_sub(whole)).copied().unwrap_or(from));
+            }
         }
-        self.elements.remember(&from.memory());
+        let (nodes, Base { layout, rest, state: own, .. }) = (self.elements.nodes(), &mut self.base);
+        let to = own.positions.iter_mut().zip(&mut own.velocities);
+        for (former, ((rest, &place), (x, v))) in
+            (0..whole).chain(copies).zip(rest.iter().zip(&layout.place_of).zip(to))
+        {
+            let displacement = state.positions[former] - *rest;
+            (*x, *v) = (*rest + displacement, state.velocities[former]);
+            nodes.set(place as usize, displacement, *v);
+        }
+        for node in splits.iter().flat_map(|split| [split.from as usize, split.node as usize]) {
+            if !self.elements.fills.is_left(node as u32) {
+                own.velocities[node] = Vec3::ZERO;
+                nodes.set(layout.place_of[node] as usize, own.positions[node] - rest[node], Vec3::ZERO);
+            }
+        }
+        if self.fills() != from.fills() {
+            self.elements.empty_to(from.fills(), &self.body, &self.base.layout);
+            self.publish();
+        }
         self.base.elapsed_ms = from.last_step_ms();
+        match from.memory().and_then(|elements| elements.downcast_mut()) {
+            Some(from) => self.elements.take_memory(from),
+            None => self.elements.forget(),
+        }
         self.elements.wake();
-        self.publish();
     }
 }
 

@@ -184,9 +184,9 @@ fn a_body_eaten_away_at_random_stays_finite_and_slow() {
 fn a_cheaper_solver_has_the_same_hole() {
     let body = block(6);
     let (_, nodes) = without(&body, &hole(&body));
-    let tled = emptied(&body, &Config::default(), &hole(&body));
+    let mut tled = emptied(&body, &Config::default(), &hole(&body));
     let mut cheaper = tled.cheaper().unwrap()().unwrap();
-    cheaper.resume(&tled, &[]);
+    cheaper.resume(&mut tled, &[]);
     let loads = Loads { gravity: GRAVITY, ..Loads::default() };
     (0..20).for_each(|_| _ = cheaper.step(&loads, 0.1));
     let is_still = |n: &u32| cheaper.velocities()[*n as usize] == Vec3::ZERO;

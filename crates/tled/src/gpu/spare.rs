@@ -8,6 +8,7 @@
 use super::{GpuTled, GpuTledError};
 use crate::config::Config;
 use crate::tled::Tled;
+use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_gpu::{Gpu, Prefer};
@@ -57,7 +58,7 @@ impl SoftSolver for WithSpare {
             if self.card.fault().is_none() {
                 return report;
             }
-            self.spare.resume(&self.card, &[]);
+            self.spare.resume(&mut self.card, &[]);
             self.lost.store(true, Ordering::Relaxed);
         }
         self.spare.step(loads, dt_ms)
@@ -79,7 +80,7 @@ impl SoftSolver for WithSpare {
         if self.is_lost() { self.spare.cheaper() } else { None }
     }
 
-    fn memory(&self) -> Vec<f32> {
-        if self.is_lost() { self.spare.memory() } else { Vec::new() }
+    fn memory(&mut self) -> Option<&mut dyn Any> {
+        if self.is_lost() { self.spare.memory() } else { None }
     }
 }

@@ -98,7 +98,7 @@ fn torture(seed: u64, wanted: usize, all: &mut Torture) {
         all.copies += splits.iter().filter(|split| split.node as usize >= body.mesh.positions.len()).count();
         let make = solver.split(&splits).expect("TLED can be split");
         let mut next = make().expect("a split body is sound");
-        next.resume(&*solver, &splits);
+        next.resume(&mut *solver, &splits);
         next.lower_fills(&fills);
         solver = next;
         // What came loose is no longer tied: energy is that of the body without ties.
@@ -173,7 +173,7 @@ fn slit(findings: &mut Findings) {
     let mut before = Tled::new(&whole, &config).expect("the block is sound");
     (0..100).for_each(|_| _ = before.step(&loads, before.stable_dt_ms()));
     let mut solver = before.split(&splits).and_then(|make| make()).expect("the body can be split");
-    solver.resume(&before, &splits);
+    solver.resume(&mut before, &splits);
     for _ in 0..20_000 {
         solver.step(&loads, solver.next_dt_ms());
     }
@@ -213,7 +213,7 @@ fn cost(findings: &mut Findings) {
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
     let body = Body::uniform(mesh, fixed, Material::BRAIN);
     let config = Config { averaged_pressure: true, relaxation: Relaxation::SOLID_AND_FLUID, ..Config::default() };
-    let solver = Tled::new(&body, &config).expect("the block is sound");
+    let mut solver = Tled::new(&body, &config).expect("the block is sound");
     let (mut change_us, mut make_ms) = (Vec::new(), Vec::new());
     for turn in 0..20 {
         let splits = with_slit(&body, 30.0 + turn as f32);
@@ -222,7 +222,7 @@ fn cost(findings: &mut Findings) {
         let mut next = make().expect("the body is sound");
         make_ms.push(1e3 * begun.elapsed().as_secs_f64());
         let begun = Instant::now();
-        next.resume(&solver, &splits);
+        next.resume(&mut solver, &splits);
         change_us.push(1e6 * begun.elapsed().as_secs_f64());
     }
     [&mut change_us, &mut make_ms].into_iter().for_each(|all| all.sort_by(f64::total_cmp));
