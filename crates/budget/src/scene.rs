@@ -49,6 +49,8 @@ pub struct Scene {
     pub view_mm: f64,
     /// Frame rate, Hz.
     pub pictures_per_s: f64,
+    /// Whether the pictures are shown in a window.
+    pub has_window: bool,
 }
 
 impl Default for Scene {
@@ -79,6 +81,7 @@ impl Default for Scene {
             picture_pixels: [960, 720],
             view_mm: 200.0,
             pictures_per_s: 10.0,
+            has_window: false,
         }
     }
 }

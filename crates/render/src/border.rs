@@ -80,8 +80,11 @@ pub(crate) struct Changes {
     pub triangles: Vec<u32>,
 }
 
-/// Motion of a node that is not followed, mm, numerical: a tenth of a pixel of 1280x800.
-const STILL_MM: f32 = 0.01;
+/// Motion of a node that is not followed, mm, numerical: a third of a pixel of 1280x800 from near.
+const STILL_MM: f32 = 0.03;
+
+/// Nodes or triangles over those that changed from which on all count as changed, numerical.
+const MOST: usize = 2;
 
 /// Whether a place is so near to where it was that it may stay there.
 fn is_still(was: Vec3, is: Vec3) -> bool {
@@ -394,7 +397,7 @@ impl Border {
     /// Updates the vertices from the mesh's nodes, or resets them to rest.
     ///
     /// They are drawn onto what the balls of tools touch, with their radii, mm. After `settle`
-    /// nodes that moved by less than 0.01 mm stay where they are. Call it after `cover` and
+    /// nodes that moved by less than 0.03 mm stay where they are. Call it after `cover` and
     /// `stain`.
     pub fn follow(&mut self, positions: Option<&[Vec3]>, balls: &[(Vec3, f32)]) -> Result<(), RenderError> {
         let positions = positions.unwrap_or(&self.rest);
@@ -409,8 +412,9 @@ impl Border {
             stirs
         };
         let stirred: Vec<bool> = self.now.iter_mut().zip(positions).map(stirs).collect();
+        let most = MOST * stirred.iter().filter(|stirs| **stirs).count() > stirred.len();
         let now = &self.now;
-        let before = if all { Vec::new() } else { self.places.clone() };
+        let before = if all || most { Vec::new() } else { self.places.clone() };
         let cortex = self.first_wall.min(self.places.len());
         self.places.par_iter_mut().zip(&self.embeddings).enumerate().for_each(|(n, (place, embedding))| {
             // Walls are smoothed anew from where the tetrahedra have them.
@@ -423,7 +427,10 @@ impl Border {
         }
         self.walls.smooth(&mut self.places[cortex..]);
         self.touched = touch(&mut self.places[..self.embeddings.len()], &self.faces, &self.now, balls);
-        if self.changes.note(&before, &self.places[..self.embeddings.len()], &self.triangles) {
+        if most && !all {
+            self.changes.fill(self.triangles.len());
+        }
+        if most || self.changes.note(&before, &self.places[..self.embeddings.len()], &self.triangles) {
             smooth_normals(&self.places, &self.triangles, &mut self.normals, &self.changes);
             let ways = self.places[..self.embeddings.len()].par_iter().zip(&self.at_rest);
             let moved = ways.map(|(place, rest)| place.distance_squared(*rest)).reduce(|| 0.0, f32::max);
@@ -469,6 +476,19 @@ impl Border {
 }
 
 impl Changes {
+    /// Whether most of so many triangles look different.
+    pub fn are_most(&self, triangles: usize) -> bool {
+        MOST * self.triangles.len() > triangles
+    }
+
+    /// Notes that all of so many triangles look different.
+    fn fill(&mut self, triangles: usize) {
+        self.moved.fill(true);
+        self.turned.fill(true);
+        self.triangles.clear();
+        self.triangles.extend(0..triangles as u32);
+    }
+
     /// Notes which vertices are elsewhere than before, and the triangles that therefore look
     /// different; returns whether any does.
     fn note(&mut self, before: &[Vec3], places: &[Vec3], triangles: &[[u32; 3]]) -> bool {
@@ -492,12 +512,13 @@ impl Changes {
 /// Area-weighted mean of the triangle normals at every vertex that turned; zero where they cancel.
 /// Each thread sums for some of the vertices.
 fn smooth_normals(places: &[Vec3], triangles: &[[u32; 3]], normals: &mut [Vec3], changes: &Changes) {
-    let turned = |n: usize| changes.all || changes.turned[n];
+    let all = changes.all || changes.triangles.len() == triangles.len();
+    let turned = |n: usize| all || changes.turned[n];
     let twice_area = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|n| places[n as usize]);
         (b - a).cross(c - a)
     };
-    if !changes.all {
+    if !all {
         let turning = || (0..normals.len()).filter(|n| turned(*n));
         let all: Vec<usize> = turning().collect();
         all.iter().for_each(|n| normals[*n] = Vec3::ZERO);

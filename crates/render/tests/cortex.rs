@@ -174,7 +174,7 @@ fn a_picture_drawn_on_from_the_last_is_the_one_drawn_anew() {
             let changes = before.replace(anew.image().clone()).is_none_or(|before| before != *anew.image());
             assert!(changes, "{n} changes nothing: it tests nothing");
         }
-        // Nodes that creep stay until they moved by 0.01 mm: a twelfth of a pixel here.
+        // Nodes that creep stay until they moved by 0.03 mm: a quarter of a pixel here.
         for n in 1..40 {
             let crept: Vec<Vec3> = mesh.positions.iter().map(|p| *p + 0.0019 * n as f32 * Vec3::Z).collect();
             let step = Frame { brain_positions: Some(&crept), ..frame() };

@@ -13,7 +13,7 @@ use trepan_geometry::{Pose, Tool};
 use trepan_render::{Camera, Cut, Frame, SliceLook, Stereo};
 
 /// Selectable fractions of the 3-D view's pixels along an edge.
-const DETAILS: [f32; 7] = [1.0, 0.75, 0.55, 0.4, 0.3, 0.22, 0.16];
+const DETAILS: [f32; 7] = [1.0, 0.75, 0.5, 0.4, 0.3, 0.22, 0.16];
 
 /// Coarsest of them before a view that stands still, drawn by the processor. It draws only what
 /// changed there, so that fewer pixels save little.
@@ -321,23 +321,23 @@ mod tests {
     fn it_starts_at_the_given_detail() {
         let starts = [(false, 1.0), (true, 1.0), (false, 0.5), (true, 0.25), (false, 0.1)]
             .map(|(s, d)| Quality::new(s, d).detail());
-        assert_eq!(starts, [1.0, 0.4, 0.4, 0.22, 0.16]);
+        assert_eq!(starts, [1.0, 0.4, 0.5, 0.22, 0.16]);
     }
 
     #[test]
     fn waiting_for_others_makes_the_picture_no_coarser() {
-        let mut quality = Quality::new(false, 0.55);
+        let mut quality = Quality::new(false, 0.5);
         for n in 0..50u32 {
             let now = 0.2 * f64::from(n);
             quality.step(&frame(n), SIZE, false, now);
             quality.note(0.01, now);
         }
-        assert_eq!((quality.detail(), quality.text()), (0.55, "5 pictures/s, 55 % sharp".into()));
+        assert_eq!((quality.detail(), quality.text()), (0.5, "5 pictures/s, 50 % sharp".into()));
     }
 
     #[test]
     fn a_view_that_stands_keeps_half_of_its_pixels_on_the_processor() {
-        for (software, coarsest) in [(true, 0.55), (false, 0.16)] {
+        for (software, coarsest) in [(true, 0.5), (false, 0.16)] {
             let mut quality = Quality::new(software, 1.0);
             let mut now = 0.0;
             for n in 0..40 {
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn a_sharp_picture_between_changes_nothing() {
-        let mut quality = Quality::new(false, 0.55);
+        let mut quality = Quality::new(false, 0.5);
         for n in 0..50u32 {
             let now = f64::from(n);
             quality.step(&frame(n), SIZE, false, now);
@@ -363,7 +363,7 @@ mod tests {
             assert_eq!(quality.step(&frame(n), SIZE, false, now + 0.3), Step::Draw(1.0));
             quality.note(0.5, now + 0.3);
         }
-        assert_eq!(quality.detail(), 0.55);
+        assert_eq!(quality.detail(), 0.5);
     }
 
     #[test]
@@ -405,11 +405,11 @@ mod tests {
         ];
         for (n, changed) in changes.iter().enumerate() {
             // In three of them the view is that of the one before.
-            let detail = if (2..5).contains(&n) { 0.55 } else { 0.4 };
+            let detail = if (2..5).contains(&n) { 0.5 } else { 0.4 };
             assert_eq!(quality.step(changed, SIZE, false, 1.0 + n as f64), Step::Draw(detail), "{n}");
         }
         assert_eq!(quality.step(&changes[7], [64, 49], false, 9.0), Step::Draw(0.4));
-        assert_eq!(quality.step(&changes[7], [64, 49], true, 9.0), Step::Draw(0.55), "bone has changed");
+        assert_eq!(quality.step(&changes[7], [64, 49], true, 9.0), Step::Draw(0.5), "bone has changed");
         assert_eq!(quality.step(&changes[7], [64, 49], false, 9.1), Step::Keep);
     }
 

@@ -25,7 +25,7 @@ pub(crate) fn show(ui: &mut egui::Ui, tool: &Tool, number: usize, name: &str, st
     let ink = if open { visuals.text_color() } else { ui.visuals().weak_text_color() };
     let back = if chosen { SKY } else { visuals.weak_bg_fill };
     let ink = if chosen { Color32::BLACK } else { ink };
-    ui.painter().rect_filled(area, 3.0, back);
+    ui.painter().rect_filled(area, visuals.corner_radius, back);
     silhouette(ui.painter(), egui::Rect::from_min_size(area.min, egui::vec2(ICON, HEIGHT)), tool, ink);
     let at = egui::pos2(area.left() + ICON + 4.0, area.center().y);
     let font = TextStyle::Button.resolve(ui.style());

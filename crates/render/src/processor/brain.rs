@@ -5,7 +5,7 @@
 //! cortex has half a million triangles, a picture shows a tenth of them.
 
 use super::rows;
-use super::tiles::Tiles;
+use super::tiles::{EDGE, Tiles};
 use crate::border::Border;
 use crate::bricks::NOTHING;
 use crate::camera::View;
@@ -45,6 +45,9 @@ struct Meeting {
     /// Weights of the second and the third corner.
     weights: [f32; 2],
 }
+
+/// Bands of rows for each thread, numerical: a thread that comes late leaves its bands to others.
+const BANDS: usize = 2;
 
 /// The bit of what turns its back where a closed cortex is cut: the cut is seen there.
 const BACK: u32 = 1 << 31;
@@ -142,8 +145,11 @@ impl Fragments {
         threads: usize,
         known: Option<&mut Tiles>,
     ) {
-        let all = known.is_none();
+        let mut tiles = Tiles::of([self.width, self.height]);
+        // Where most changed, finding out where takes longer than to draw all of it.
+        let all = known.is_none() || border.is_some_and(|border| border.changes.are_most(border.triangles.len()));
         if std::mem::replace(&mut self.drawn, border.is_some()) && all {
+            self.mark_seen(&mut tiles);
             self.nearest.fill(NOWHERE);
         }
         let Some(border) = border else { return };
@@ -152,19 +158,27 @@ impl Fragments {
         if brain_cut != Vec4::ZERO {
             self.cut.extend(section::triangles(brain_cut, border));
         }
-        let mut tiles = Tiles::of([self.width, self.height]);
-        match known {
-            Some(known) => {
-                self.follow(border, view, &mut tiles);
-                known.join(&tiles);
-            }
-            None => {
-                tiles.fill(true);
-                self.project(border, view);
+        if all {
+            self.project(border, view);
+            self.rasterise(border, view, threads, None);
+            self.mark_seen(&mut tiles);
+        } else {
+            self.follow(border, view, &mut tiles);
+            if tiles.marks().contains(&true) {
+                self.rasterise(border, view, threads, Some(&tiles));
             }
         }
-        if tiles.marks().contains(&true) {
-            self.rasterise(border, view, threads, (!all).then_some(&tiles));
+        known.into_iter().for_each(|known| known.join(&tiles));
+    }
+
+    /// Marks the tiles in which the brain is seen.
+    fn mark_seen(&self, tiles: &mut Tiles) {
+        for (y, row) in self.nearest.chunks_exact(self.width.max(1)).enumerate() {
+            for (column, part) in row.chunks(EDGE).enumerate() {
+                if part.iter().any(|meeting| meeting.nearness > 0.0) {
+                    tiles.mark_rectangle([EDGE * column, y, EDGE * column + 1, y + 1]);
+                }
+            }
         }
     }
 
@@ -222,7 +236,8 @@ impl Fragments {
         let chunks: Vec<(Range<usize>, [Vec2; 2])> = chunks.map(|(c, bounds)| (c.triangles.clone(), *bounds)).collect();
         let brain_cut = self.plane;
         let (vertices, cut) = (&self.vertices, &self.cut);
-        let ends = bands(chunks.iter().map(|(_, [low, high])| 0.5 * (low.y + high.y)), self.height, threads);
+        let count = if threads > 1 { BANDS * threads } else { 1 };
+        let ends = bands(chunks.iter().map(|(_, [low, high])| 0.5 * (low.y + high.y)), self.height, count);
         let mut nearest = &mut self.nearest[..];
         let parts = ends.windows(2).map(|ends| {
             let (part, rest) = std::mem::take(&mut nearest).split_at_mut(self.width * (ends[1] - ends[0]));
@@ -269,12 +284,12 @@ fn around(border: &Border, chunk: &Chunk, vertices: &[Vertex]) -> [Vec2; 2] {
     before.fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], v| [low.min(v.at), high.max(v.at)])
 }
 
-/// Rows at which as many bands begin and end as there are threads, with as many chunks each.
-fn bands(middles: impl Iterator<Item = f32>, height: usize, threads: usize) -> Vec<usize> {
+/// Rows at which so many bands begin and end, with as many chunks each.
+fn bands(middles: impl Iterator<Item = f32>, height: usize, count: usize) -> Vec<usize> {
     let mut rows: Vec<f32> = middles.collect();
     rows.sort_unstable_by(f32::total_cmp);
-    let middle = |n: usize| rows.get(n * rows.len() / threads.max(1)).copied().unwrap_or(0.0);
-    let mut ends: Vec<usize> = (1..threads).map(|n| (middle(n).max(0.0) as usize).min(height)).collect();
+    let middle = |n: usize| rows.get(n * rows.len() / count).copied().unwrap_or(0.0);
+    let mut ends: Vec<usize> = (1..count).map(|n| (middle(n).max(0.0) as usize).min(height)).collect();
     ends.insert(0, 0);
     ends.push(height);
     ends
@@ -321,29 +336,38 @@ impl Band<'_> {
         if lines.is_empty() || columns.is_empty() || corners.iter().any(|v| v.nearness <= 0.0) {
             return;
         }
+        let edges = [(b, c - b), (c, a - c), (a, b - a)];
+        let (least, sign) = (Vec4::ZERO, Vec4::splat(double_area.signum()));
         for y in lines {
-            for x in columns.clone() {
-                let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let flat = [(c - b).perp_dot(p - b), (a - c).perp_dot(p - c), (b - a).perp_dot(p - a)]
-                    .map(|w| w / double_area);
-                if flat.iter().any(|&w| w < 0.0) {
+            let line = y as i32 as f32 + 0.5;
+            for first in columns.clone().step_by(4) {
+                let middles = Vec4::splat(first as i32 as f32) + Vec4::new(0.5, 1.5, 2.5, 3.5);
+                // Twice the area between each edge and the middles of four pixels.
+                let twice = edges.map(|(from, to)| Vec4::splat(to.x * (line - from.y)) - to.y * (middles - from.x));
+                let [a, b, c] = twice.map(|w| (w * sign).cmplt(least));
+                let inside = !(a | b | c).bitmask() & ((1 << (columns.end - first).min(4)) - 1);
+                if inside == 0 {
                     continue;
                 }
-                // Perspective-correct interpolation: attributes are divided by depth.
-                let over = [0, 1, 2].map(|n| flat[n] * corners[n].nearness);
-                let nearness = over.iter().sum::<f32>();
-                let nearest = &mut self.nearest[x + self.width * (y - self.rows.start)];
-                let is_hidden = match side {
-                    Side::Cut => nearest.triangle & BACK == 0 || nearest.nearness <= 0.0,
-                    _ => nearness <= nearest.nearness,
-                };
-                if is_hidden {
-                    continue;
-                }
-                let weights = over.map(|over| over / nearness);
-                if is_left(weights) {
-                    let mark = if is_back && side == Side::Marked { BACK } else { 0 };
-                    *nearest = Meeting { nearness, triangle: number | mark, weights: [weights[1], weights[2]] };
+                let twice = twice.map(|w| w.to_array());
+                for lane in (0..4).filter(|lane| inside & (1 << lane) != 0) {
+                    let flat = twice.map(|w| w[lane] / double_area);
+                    // Perspective-correct interpolation: attributes are divided by depth.
+                    let over = [0, 1, 2].map(|n| flat[n] * corners[n].nearness);
+                    let nearness = over.iter().sum::<f32>();
+                    let nearest = &mut self.nearest[first + lane + self.width * (y - self.rows.start)];
+                    let is_hidden = match side {
+                        Side::Cut => nearest.triangle & BACK == 0 || nearest.nearness <= 0.0,
+                        _ => nearness <= nearest.nearness,
+                    };
+                    if is_hidden {
+                        continue;
+                    }
+                    let weights = over.map(|over| over / nearness);
+                    if is_left(weights) {
+                        let mark = if is_back && side == Side::Marked { BACK } else { 0 };
+                        *nearest = Meeting { nearness, triangle: number | mark, weights: [weights[1], weights[2]] };
+                    }
                 }
             }
         }

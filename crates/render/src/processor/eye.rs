@@ -2,7 +2,7 @@
 
 use super::brain::Fragments;
 use super::edges::Edges;
-use super::reuse::{LastPicture, near};
+use super::reuse::LastPicture;
 use super::skull::{Ray, TILE, cast, clear};
 use super::tiles::{EDGE, Tiles};
 use super::{Inputs, light, overlay, rows};
@@ -84,7 +84,7 @@ impl EyeHits {
             self.tiles.grow();
         }
         drawn.measure(before, &self.tiles, &self.rays, &self.fragments, self.tiles.threads(threads));
-        self.light(inputs, brain, &drawn.tools, self.tiles.threads(threads));
+        self.light(inputs, brain, &drawn, self.tiles.threads(threads));
         self.drawn = Some(drawn);
         let (rays, fragments) = (&self.rays, &self.fragments);
         let depth = |at: usize| rays[at].t.min(fragments.t(brain, at));
@@ -127,7 +127,7 @@ impl EyeHits {
             let ray = if cast_bone { cast(bricks, scene, at, 0.0, &[]) } else { Ray::NONE };
             let brain = &fragments.at(brain, pixel);
             let near = tools.map(|tool| overlay::inside(tool, at));
-            (light::fragment(inputs, at, near, &ray, brain), ray.t.min(brain.t))
+            (light::fragment(inputs, at, [near, [true; 2]], &ray, brain), ray.t.min(brain.t))
         };
         let mut samples = vec![([0; 4], NOTHING); edges.pixels.len()];
         rows::share(threads, samples.chunks_mut(CHUNK).enumerate(), |n, chunk| {
@@ -182,13 +182,12 @@ impl EyeHits {
     }
 
     /// Shades every pixel of marked tiles.
-    fn light(&mut self, inputs: &Inputs, brain: Option<&Border>, tools: &[Tiles; 2], threads: usize) {
+    fn light(&mut self, inputs: &Inputs, brain: Option<&Border>, drawn: &LastPicture, threads: usize) {
         let [width, height] = self.size.map(|n| n as usize);
         let (rays, fragments, tiles) = (&self.rays, &self.fragments, &self.tiles);
-        let near = |at: [usize; 2]| near(tools, at);
         let exact = |[x, y]: [usize; 2], _: &[[u8; 4]]| {
             let at = x + width * y;
-            light::fragment(inputs, [x, y], near([x, y]), &rays[at], &fragments.at(brain, at))
+            light::fragment(inputs, [x, y], drawn.near([x, y]), &rays[at], &fragments.at(brain, at))
         };
         if !inputs.bricks.casting.sparse {
             return rows::share(threads, rows::of(&mut self.pixels, width, 0..height, 0..width), |y, row| {
@@ -201,8 +200,10 @@ impl EyeHits {
             let at = x + width * y;
             let (aside, off) = (x % 2, y % 2 * width);
             let corners = || [at - aside - off, at + aside - off, at - aside + off, at + aside + off];
-            let smooth =
-                rays[at].is_between() && near([x, y]) == [false; 2] && bone(at) && corners().into_iter().all(bone);
+            let smooth = rays[at].is_between()
+                && drawn.near([x, y])[0] == [false; 2]
+                && bone(at)
+                && corners().into_iter().all(bone);
             smooth.then(|| mean(around))
         });
     }

@@ -14,8 +14,15 @@ use crate::tool::{TINES, TUBE, ToolShape};
 use glam::{Vec3, Vec4};
 use std::sync::LazyLock;
 
-/// The colour of a pixel; `near` selects the tools that may appear there.
-pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
+/// The colour of a pixel; `near` selects the tools that may appear there, `shading` those whose
+/// shadow may fall there.
+pub(crate) fn fragment(
+    inputs: &Inputs,
+    [x, y]: [usize; 2],
+    [near, shading]: [[bool; 2]; 2],
+    bone: &Ray,
+    brain: &Fragment,
+) -> [u8; 4] {
     let scene = inputs.scene;
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
     let meets = |n: usize| if near[n] { scene.tools[n].reach(eye, along) } else { NOTHING };
@@ -34,9 +41,9 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
     } else if t == second {
         shade_tool(scene, point, along, &scene.tools[1])
     } else if t == brain_t {
-        shade_brain(inputs, point, along, brain)
+        shade_brain(inputs, point, along, shading, brain)
     } else {
-        shade_bone(inputs, point, along, bone)
+        shade_bone(inputs, point, along, shading, bone)
     };
     shown(colour)
 }
@@ -54,7 +61,7 @@ pub(crate) fn shown(colour: Vec3) -> [u8; 4] {
     [at(colour.x), at(colour.y), at(colour.z), 255]
 }
 
-fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, bone: &Ray) -> Vec3 {
+fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, shading: [bool; 2], bone: &Ray) -> Vec3 {
     let scene = inputs.scene;
     let colour = bone_colour(inputs, point, bone.normal);
     let mut colour = inputs.bone_paint.map_or(colour, |paint| paint.over(colour, point));
@@ -65,7 +72,7 @@ fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, bone: &Ray) -> Vec3 {
             colour = colour.lerp(Vec3::new(0.95, 0.92, 0.86), 0.6 * wet);
         }
     }
-    let key = past_tools(scene, point) * f32::from(u8::from(bone.lit));
+    let key = past_tools(scene, point, shading) * f32::from(u8::from(bone.lit));
     lit(scene, colour, bone.normal, along, bone.open, key, 0.06 + 0.4 * wet)
 }
 
@@ -86,10 +93,10 @@ fn dusty(point: Vec3) -> bool {
     (mixed.wrapping_mul(2_654_435_761) >> 16).is_multiple_of(12)
 }
 
-fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> Vec3 {
+fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, shading: [bool; 2], brain: &Fragment) -> Vec3 {
     let scene = inputs.scene;
     let painted = |colour| inputs.brain_paint.map_or(colour, |paint| paint.over(colour, brain.rest));
-    let mut key = past_tools(scene, point);
+    let mut key = past_tools(scene, point, shading);
     if brain.cut {
         return painted(cut_colour(scene, inputs.mri, brain.rest)) * (0.6 + 0.4 * key);
     }
@@ -149,9 +156,10 @@ fn pass_by(gap: f32, way: f32) -> f32 {
     smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3))
 }
 
-/// Fraction of light that the tools let pass to a point.
-fn past_tools(scene: &Scene, point: Vec3) -> f32 {
-    scene.tools.iter().map(|tool| past(scene.light.truncate(), point, tool.tip, tool.tail)).product()
+/// Fraction of light that the tools let pass to a point, of those that may shade it.
+fn past_tools(scene: &Scene, point: Vec3, shading: [bool; 2]) -> f32 {
+    let tools = scene.tools.iter().zip(shading).filter(|(_, shading)| *shading);
+    tools.map(|(tool, _)| past(scene.light.truncate(), point, tool.tip, tool.tail)).product()
 }
 
 fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {

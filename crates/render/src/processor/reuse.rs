@@ -36,9 +36,11 @@ pub(crate) struct LastPicture {
     /// Where the overlay is.
     items: Vec<[usize; 4]>,
     /// Where each tool is.
-    pub tools: [Tiles; 2],
+    tools: [Tiles; 2],
     /// Distances in each tile, mm.
     seen: Vec<[f32; 2]>,
+    /// Where each tool's shadow may fall, of the tiles that were drawn anew.
+    shadows: [Tiles; 2],
 }
 
 impl LastPicture {
@@ -53,7 +55,17 @@ impl LastPicture {
         let paints = [inputs.bone_paint, inputs.brain_paint].map(|paint| paint.map(|paint| paint.version));
         let items = items.iter().map(|item| rectangle(&item.tool, view, size)).collect();
         let fixed = (paints, has_brain);
-        Self { view: *view, scene: *scene, fixed, casting: inputs.bricks.casting, items, tools, seen: Vec::new() }
+        let shadows = [Tiles::of(size), Tiles::of(size)];
+        Self {
+            view: *view,
+            scene: *scene,
+            fixed,
+            casting: inputs.bricks.casting,
+            items,
+            tools,
+            seen: Vec::new(),
+            shadows,
+        }
     }
 
     /// Whether a picture differs from this one, drawn before it, in some tiles only.
@@ -92,7 +104,7 @@ impl LastPicture {
     }
 
     /// Takes the distances in tiles that are not marked from the picture before, measures the
-    /// others.
+    /// others and where shadows may fall in them.
     pub fn measure(&mut self, before: Option<Self>, tiles: &Tiles, rays: &[Ray], brain: &Fragments, threads: usize) {
         self.seen = before.map_or_else(Vec::new, |before| before.seen);
         self.seen.resize(tiles.marks().len(), NOTHING_SEEN);
@@ -118,6 +130,19 @@ impl LastPicture {
                 }
             }
         });
+        for n in (0..tiles.marks().len()).filter(|n| tiles.marks()[*n]) {
+            let Some((middle, radius_mm)) = ball(scene, tiles, n, self.seen[n]) else { continue };
+            for (shadow, tool) in self.shadows.iter_mut().zip(&scene.tools) {
+                if is_shaded(scene.light.truncate(), middle, radius_mm, tool) {
+                    shadow.mark_tile(n);
+                }
+            }
+        }
+    }
+
+    /// Tools that may be seen at a pixel, and those whose shadow may fall there.
+    pub fn near(&self, at: [usize; 2]) -> [[bool; 2]; 2] {
+        [&self.tools, &self.shadows].map(|of| [0, 1].map(|n| of[n].holds(at)))
     }
 }
 
@@ -152,9 +177,4 @@ fn mark(tool: &ToolShape, view: &View, size: [usize; 2], tiles: &mut Tiles) {
             tiles.mark_rectangle(rectangle(&part, view, size));
         }
     }
-}
-
-/// Which tools may be seen at a pixel.
-pub(crate) fn near(tools: &[Tiles; 2], at: [usize; 2]) -> [bool; 2] {
-    [0, 1].map(|n| tools[n].holds(at))
 }

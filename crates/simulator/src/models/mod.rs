@@ -69,7 +69,8 @@ pub(crate) struct ModelRequest {
     rate_hz: f32,
     /// Pixels of the picture; `None` without pictures.
     picture: Option<[u32; 2]>,
-    pictures_per_s: f64,
+    /// Pictures per second of a film; `None` for a window.
+    film_hz: Option<f64>,
 }
 
 impl ModelRequest {
@@ -96,7 +97,7 @@ impl ModelRequest {
             young_mpa: units::mpa_from_kpa(operation.young_modulus_kpa),
             rate_hz: operation.rate_hz,
             picture: pictures.then_some(options.picture),
-            pictures_per_s: if options.headless && pictures { options.frames_per_second } else { LIVE_HZ },
+            film_hz: options.headless.then_some(if pictures { options.frames_per_second } else { LIVE_HZ }),
         })
     }
 
@@ -116,7 +117,7 @@ impl ModelRequest {
             young_mpa: Material::BRAIN.young_mpa() as f32,
             rate_hz,
             picture: Some(picture),
-            pictures_per_s: LIVE_HZ,
+            film_hz: None,
         })
     }
 
@@ -238,7 +239,8 @@ impl ModelRequest {
             device_rate_hz: self.rate_hz.into(),
             picture_pixels: self.picture.map_or(usual.picture_pixels, view_pixels),
             view_mm: VIEW_MM,
-            pictures_per_s: self.pictures_per_s,
+            pictures_per_s: self.film_hz.unwrap_or(LIVE_HZ),
+            has_window: self.film_hz.is_none(),
             ..usual
         }
     }
@@ -293,7 +295,7 @@ impl Models {
 const VIEW_MM: f64 = 105.0;
 
 /// Frame rate of a window, Hz, numerical.
-const LIVE_HZ: f64 = 10.0;
+const LIVE_HZ: f64 = 20.0;
 
 /// Force with which a hand presses a burr, N.
 const PRESS_N: f64 = 1.0;
