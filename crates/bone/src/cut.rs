@@ -54,6 +54,8 @@ pub(crate) struct CutField {
     owners: Box<[AtomicU32]>,
     used: AtomicU32,
     values: Box<[AtomicI16]>,
+    /// How often the brick at each place was changed.
+    versions: Box<[AtomicU32]>,
 }
 
 impl CutField {
@@ -71,6 +73,7 @@ impl CutField {
             owners: zeroed_slice_box(pool),
             used: AtomicU32::new(0),
             values: zeroed_slice_box(pool * BRICK_NODES),
+            versions: zeroed_slice_box(pool),
         }
     }
 
@@ -177,6 +180,13 @@ impl BoneVolume {
         let under = (RAMP_HU / self.cut.nodes as f32 * cut_depth(value)).round() as i32;
         let most = i32::from(self.isovalue) - if value >= CUT_SURFACE { under.max(1) } else { under };
         hu.min(most.clamp(trepan_volume::AIR_HU.into(), i16::MAX.into()) as i16)
+    }
+
+    /// How often a brick of nodes was changed; it lies in the brick of voxels at its place over
+    /// [`cut_nodes`](Self::cut_nodes), whose [`cut_version`](Self::cut_version) changes after it.
+    #[inline]
+    pub fn cut_part_version(&self, brick: IVec3) -> u32 {
+        self.cut.find(brick).map_or(0, |place| self.cut.versions[place].load(Ordering::Acquire))
     }
 
     /// Whether anything was cut within 4 nodes of the box of nodes from `low` to `high`, inclusive.
@@ -291,10 +301,12 @@ impl Drop for CutWriter<'_> {
 impl BoneVolume {
     /// Tells readers that a brick of nodes has changed.
     pub(crate) fn note_cut(&self, brick: IVec3) {
+        let add =
+            |version: &AtomicU32| version.store(version.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+        self.cut.find(brick).into_iter().for_each(|place| add(&self.cut.versions[place]));
         let low = BRICK as i32 * brick;
         // A brick of nodes lies within one brick of voxels, since its edge divides theirs.
-        let version = &self.cut_versions[self.brick_of_node(low)];
-        version.store(version.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+        add(&self.cut_versions[self.brick_of_node(low)]);
     }
 }
 

@@ -50,6 +50,8 @@ pub(crate) struct Window {
     filled: bool,
     /// Versions of the bricks that it meets; brick (i, j, k) lies at each index mod [`BRICKS`].
     seen: Vec<u32>,
+    /// The same for bricks of nodes, of the cut.
+    seen_parts: Vec<u32>,
     /// The value from which a cell is bone; with the cut, from which it is not.
     border: i16,
 }
@@ -57,10 +59,11 @@ pub(crate) struct Window {
 impl Window {
     pub fn new(shown: WindowContent) -> Self {
         let (cells, seen) = (vec![0; 1 << (3 * MAX_BITS)], vec![0; BRICKS.pow(3) as usize]);
+        let seen_parts = if shown == WindowContent::Cut { seen.clone() } else { Vec::new() };
         let read = Vec::with_capacity(1 << (3 * MAX_BITS));
         let scratch = BetweenScratch::new(if shown == WindowContent::Density { 1 << MAX_BITS } else { 0 });
         let (brick, low) = (BRICK as i32, IVec3::ZERO);
-        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, border: CUT_SURFACE }
+        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, seen_parts, border: CUT_SURFACE }
     }
 
     /// Everything is to be read anew.
@@ -122,14 +125,23 @@ impl Window {
         let mut changed = false;
         let (low, high) = (self.low, self.low + (1 << self.bits));
         self.bricks(|window, brick| {
-            if window.seen[place(brick)] != window.version(bone, brick) {
-                window.see(bone, brick);
-                // Densities change beyond the brick, by less than a voxel.
-                let more = if window.shown == WindowContent::Density { bone.cut_nodes() } else { 0 };
-                let from = brick * window.brick;
-                window.read(bone, (from - more).max(low), (from + window.brick + more).min(high));
-                changed = true;
+            let version = window.version(bone, brick);
+            if std::mem::replace(&mut window.seen[place(brick)], version) == version {
+                return;
             }
+            changed = true;
+            if window.shown == WindowContent::Density {
+                // Densities change beyond the brick, by less than a voxel.
+                let (from, more) = (brick * window.brick, bone.cut_nodes());
+                return window.read(bone, (from - more).max(low), (from + window.brick + more).min(high));
+            }
+            let (edge, [first, end]) = (BRICK as i32, window.parts(bone, brick));
+            each(first, end, |part| {
+                let version = bone.cut_part_version(part);
+                if std::mem::replace(&mut window.seen_parts[place(part)], version) != version {
+                    window.read(bone, (edge * part).max(low), (edge * (part + 1)).min(high));
+                }
+            });
         });
         changed
     }
@@ -150,6 +162,17 @@ impl Window {
 
     fn see(&mut self, bone: &BoneVolume, brick: IVec3) {
         self.seen[place(brick)] = self.version(bone, brick);
+        if self.shown == WindowContent::Cut {
+            let [first, end] = self.parts(bone, brick);
+            each(first, end, |part| self.seen_parts[place(part)] = bone.cut_part_version(part));
+        }
+    }
+
+    /// The first brick of nodes of a brick of voxels that the window meets, and the end of them.
+    fn parts(&self, bone: &BoneVolume, brick: IVec3) -> [IVec3; 2] {
+        let of = |cell: IVec3| cell.div_euclid(IVec3::splat(BRICK as i32));
+        let (first, last) = (of(self.low), of(self.low + (1 << self.bits) - 1));
+        [first.max(brick * bone.cut_nodes()), (last + 1).min((brick + 1) * bone.cut_nodes())]
     }
 
     fn read(&mut self, bone: &BoneVolume, from: IVec3, to: IVec3) {
@@ -328,6 +351,22 @@ mod tests {
                     prop_assert_eq!(window.at(voxel), bone.ct(voxel));
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_others_cut_is_read_wherever_the_window_goes() {
+        // Two nodes a voxel: a brick of voxels holds eight of nodes.
+        let ct = VoxelVolume::isotropic([24; 3], Vec3::ZERO, 1.0, 900i16);
+        let bone = BoneVolume::new(&ct, 400).unwrap();
+        let mut window = Window::new(WindowContent::Cut);
+        for n in 0..60 {
+            let centre = IVec3::new(n % 40, 20 + n % 7, (3 * n) % 40);
+            window.cover(&bone, centre, 8).unwrap();
+            let others = centre + IVec3::new(n % 9 - 4, 5 - n % 11, n % 5);
+            bone.cut_writer().set(others, CUT_SURFACE + n as i16);
+            assert!(window.renew(&bone) && !window.renew(&bone), "{n}");
+            each(centre - 8, centre + 9, |node| assert_eq!(window.at(node), bone.cut_at(node), "{n} {node}"));
         }
     }
 
