@@ -30,6 +30,7 @@ use trepan_bone::BoneVolume;
 use trepan_geometry::Vec3;
 use trepan_link::cell::Reader;
 use trepan_link::{NODE_STEP_MM, SceneChange, SceneRecord, SceneWriter};
+use trepan_mesh::Split;
 use trepan_stages::collision_step::SoftFrame;
 use trepan_stages::notice::Notice;
 
@@ -57,12 +58,23 @@ pub struct Shot {
     pub nodes: Option<Vec<[i16; 3]>>,
     /// Tetrahedra of the brain that were resected since the last shot.
     pub gone: Vec<u32>,
+    /// Splits of its nodes since the last shot, the first to a new node; then it holds the nodes.
+    pub splits: Vec<Split>,
 }
 
 /// Displacements of nodes as a film holds them.
 pub fn displacements(positions: &[Vec3], rest: &[Vec3]) -> Vec<[i16; 3]> {
     let steps = |(now, rest): (&Vec3, &Vec3)| ((*now - *rest) / NODE_STEP_MM).round().to_array().map(|mm| mm as i16);
     positions.iter().zip(rest).map(steps).collect()
+}
+
+/// Adds the rest position of each node that splits copied.
+pub fn split_rest(rest: &mut Vec<Vec3>, splits: &[Split]) {
+    for Split { from, node, .. } in splits {
+        if *node as usize == rest.len() {
+            rest.extend(rest.get(*from as usize).copied());
+        }
+    }
 }
 
 /// Position of a node that a film holds, mm.
@@ -76,15 +88,18 @@ impl Shot {
         let View { time_ms, warnings, bone_open: open, removed_mm3, spindle, .. } = self.view;
         let (voxels, cuts, nodes, gone) =
             (self.voxels.clone(), self.cuts.clone(), self.nodes.clone(), self.gone.clone());
+        let splits = self.splits.iter().map(|split| [split.corner, split.from, split.node]).collect();
         let tick = self.view.sample.tick;
-        SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes, gone }
+        SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes, gone, splits }
     }
 
     /// From a scene file, on top of the view of its tick.
     pub fn of(record: SceneRecord, view: View) -> Self {
-        let SceneRecord { time_ms, warnings, open: bone_open, removed_mm3, spindle, voxels, cuts, nodes, gone, .. } =
-            record;
-        Self { view: View { time_ms, warnings, bone_open, removed_mm3, spindle, ..view }, voxels, cuts, nodes, gone }
+        let SceneRecord { time_ms, warnings, open: bone_open, removed_mm3, spindle, .. } = record;
+        let SceneRecord { voxels, cuts, nodes, gone, splits, .. } = record;
+        let splits = splits.into_iter().map(|[corner, from, node]| Split { corner, from, node }).collect();
+        let view = View { time_ms, warnings, bone_open, removed_mm3, spindle, ..view };
+        Self { view, voxels, cuts, nodes, gone, splits }
     }
 
     /// Writes the changes since the last shot into a skull, or takes them back; returns their
@@ -105,6 +120,8 @@ pub struct Filming {
     rest: Vec<Vec3>,
     /// Which tetrahedra were gone at the last shot.
     gone: Vec<bool>,
+    /// How many splits the last shot had.
+    splits: usize,
     next_ms: f64,
     brain_every_ms: f64,
     next_brain_ms: f64,
@@ -118,16 +135,18 @@ impl Filming {
     pub fn new(skull: Option<Arc<BoneVolume>>, rest: Vec<Vec3>, length_ms: Option<f64>) -> Self {
         let brain_every_ms = length_ms.map_or(BRAIN_MS, |length_ms| (length_ms / BRAINS).max(SHOT_MS));
         let (skull, last_notices) = (skull.map(Carved::of), (0, None));
-        Self { skull, rest, gone: Vec::new(), next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }
+        let (gone, splits) = (Vec::new(), 0);
+        Self { skull, rest, gone, splits, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }
     }
 
     /// Takes a shot of a tick if one is due, if there is a new notice, or if it is the last tick.
-    /// `brain` gives the positions of the brain's nodes, mm, and what is left of its tetrahedra.
+    /// `brain` gives the positions of the brain's nodes, mm, what is left of its tetrahedra, and
+    /// all splits so far.
     pub fn tick<'a>(
         &mut self,
         view: View,
         last: bool,
-        brain: impl FnOnce() -> Option<(&'a [Vec3], &'a [u16])>,
+        brain: impl FnOnce() -> Option<(&'a [Vec3], &'a [u16], &'a [Split])>,
     ) -> Option<Shot> {
         let time_ms = view.time_ms;
         let notices = (view.warnings, view.news);
@@ -141,10 +160,14 @@ impl Filming {
             self.next_brain_ms = time_ms + self.brain_every_ms;
         }
         let brain = moved.then(brain).flatten();
-        let nodes = brain.map(|(positions, _)| displacements(positions, &self.rest));
-        let gone = self.newly_gone(brain.map_or(&[], |(_, fills)| fills));
+        let (fills, all) = brain.map_or((&[][..], &[][..]), |(_, fills, splits)| (fills, splits));
+        let splits = all.get(self.splits..).unwrap_or_default().to_vec();
+        self.splits += splits.len();
+        split_rest(&mut self.rest, &splits);
+        let nodes = brain.map(|(positions, ..)| displacements(positions, &self.rest));
+        let gone = self.newly_gone(fills);
         let (voxels, cuts) = self.skull.as_mut().map(Carved::changes).unwrap_or_default();
-        Some(Shot { view, voxels, cuts, nodes, gone })
+        Some(Shot { view, voxels, cuts, nodes, gone, splits })
     }
 
     fn newly_gone(&mut self, fills: &[u16]) -> Vec<u32> {
@@ -168,7 +191,8 @@ impl Filming {
             let (now, over) = (*view.latest().0, stop.asked());
             let last = over || now.finished;
             let brain = brain.as_mut().map(|brain| brain.latest().0);
-            let shot = self.tick(now, last, || brain.map(|brain| (&brain.positions[..], &brain.fills[..])));
+            let shot =
+                self.tick(now, last, || brain.map(|brain| (&brain.positions[..], &brain.fills[..], &brain.splits[..])));
             if let (None, Some(shot)) = (&fault, &shot) {
                 fault = writer.write(&shot.record()).err();
             }
@@ -298,9 +322,11 @@ mod tests {
             carved.set_hu(place, if ms % 3 == 0 { 700 } else { AIR_HU });
             assert!(carved.cut_writer().set(2 * place, random.i16(0..CUT_SURFACE)));
             let taken = filming.next_ms <= f64::from(ms);
-            let brain = [Vec3::splat(0.1 * ms as f32)];
+            let brain = [Vec3::splat(0.1 * ms as f32); 2];
             let fills = [1000 - ms as u16, if ms < 500 { 7 } else { 0 }];
-            shots.extend(filming.tick(view(ms.into()), ms == 999, || Some((&brain, &fills))));
+            let splits = [Split { corner: 2, from: 0, node: 1 }];
+            let (brain, splits) = if ms < 700 { (&brain[..1], &splits[..0]) } else { (&brain[..], &splits[..]) };
+            shots.extend(filming.tick(view(ms.into()), ms == 999, || Some((brain, &fills, splits))));
             if taken || ms == 999 {
                 states.push(state(&carved));
             }
@@ -317,6 +343,8 @@ mod tests {
         let gone: Vec<_> =
             shots.iter().flat_map(|shot| shot.gone.iter().map(|tet| (*tet, shot.view.time_ms))).collect();
         assert!(matches!(gone[..], [(1, ms)] if (500.0..540.0).contains(&ms)), "once: {gone:?}");
+        let cut: Vec<_> = shots.iter().filter(|shot| !shot.splits.is_empty()).collect();
+        assert!(cut.len() == 1 && cut[0].nodes.as_ref().is_some_and(|nodes| nodes.len() == 2));
         let last = shots.last().and_then(|shot| shot.nodes.clone()).unwrap();
         assert!(position(Vec3::ZERO, last[0]).distance(Vec3::splat(99.9)) < NODE_STEP_MM);
     }
@@ -335,7 +363,7 @@ mod tests {
     #[test]
     fn long_films_hold_fewer_brains() {
         let mut filming = Filming::new(None, Vec::new(), Some(3.6e6));
-        let shots = (0..10_000).filter_map(|ms| filming.tick(view(ms.into()), false, || Some((&[], &[]))));
+        let shots = (0..10_000).filter_map(|ms| filming.tick(view(ms.into()), false, || Some((&[], &[], &[]))));
         let kept: Vec<bool> = shots.map(|shot| shot.nodes.is_some()).collect();
         assert!(kept.len() > 280 && kept.iter().filter(|kept| **kept).count() == 10, "{}", kept.len());
     }

@@ -79,7 +79,7 @@ pub fn run(
                 let now = replay.tick(record, &clock);
                 view.set(now);
                 let solver = replay.tissue.as_ref().map(|tissue| &tissue.solver);
-                let brain = || solver.map(|solver| (solver.positions(), solver.fills()));
+                let brain = || solver.map(|solver| (solver.positions(), solver.fills(), solver.splits()));
                 let shot = film.as_mut().and_then(|film| film.tick(now, last == Some(record.tick), brain));
                 // Nobody looks any more.
                 film.take_if(|_| shot.is_some_and(|shot| sender.send(shot).is_err()));

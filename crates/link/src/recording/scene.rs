@@ -29,6 +29,8 @@ pub const NODE_STEP_MM: f32 = 1.0 / 256.0;
 const MOST_CHANGES: usize = 400_000;
 /// A chunk is closed when it spans this much session time, ms.
 const CHUNK_MS: f64 = 1000.0;
+/// Stands between tetrahedra and splits.
+const NO_TET: u32 = u32::MAX;
 /// Name of the layout of messages.
 const LAYOUT: &str = "trepan.scene.1";
 
@@ -66,6 +68,8 @@ pub struct SceneRecord {
     pub nodes: Option<Vec<[i16; 3]>>,
     /// Tetrahedra of the brain that were resected.
     pub gone: Vec<u32>,
+    /// Splits of its nodes: 4 · tetrahedron + corner, node before, node after.
+    pub splits: Vec<[u32; 3]>,
 }
 
 /// Writes the scene of a session.
@@ -159,7 +163,7 @@ pub fn read_scene(path: &Path, of: &SessionHeader) -> Result<Option<Vec<SceneRec
 
 fn encode(record: &SceneRecord, changes: [&[SceneChange]; 2], with_brain: bool, out: &mut Vec<u8>) {
     let nodes = record.nodes.as_deref().filter(|_| with_brain);
-    let gone = if with_brain { &record.gone[..] } else { &[] };
+    let (gone, splits) = if with_brain { (&record.gone[..], &record.splits[..]) } else { (&[][..], &[][..]) };
     out.extend(record.tick.to_le_bytes());
     out.extend(record.time_ms.to_le_bytes());
     out.extend(record.warnings.to_le_bytes());
@@ -177,6 +181,10 @@ fn encode(record: &SceneRecord, changes: [&[SceneChange]; 2], with_brain: bool, 
     let nodes = nodes.unwrap_or_default();
     (0..3).for_each(|axis| nodes.iter().for_each(|node| out.extend(node[axis].to_le_bytes())));
     gone.iter().for_each(|tet| out.extend(tet.to_le_bytes()));
+    if !splits.is_empty() {
+        out.extend(NO_TET.to_le_bytes());
+        splits.iter().flatten().for_each(|number| out.extend(number.to_le_bytes()));
+    }
 }
 
 fn decode(bytes: &[u8]) -> Option<SceneRecord> {
@@ -194,11 +202,17 @@ fn decode(bytes: &[u8]) -> Option<SceneRecord> {
         }
     };
     // Records of files without resection end here.
-    let mut gone = Vec::new();
+    let (mut gone, mut splits) = (Vec::new(), Vec::new());
     while !rest.0.is_empty() {
-        gone.push(rest.u32()?);
+        match rest.u32()? {
+            NO_TET => break,
+            tet => gone.push(tet),
+        }
     }
-    Some(SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes, gone })
+    while !rest.0.is_empty() {
+        splits.push([rest.u32()?, rest.u32()?, rest.u32()?]);
+    }
+    Some(SceneRecord { tick, time_ms, warnings, open, removed_mm3, spindle, voxels, cuts, nodes, gone, splits })
 }
 
 fn changes(rest: &mut Cursor<'_>) -> Option<Vec<SceneChange>> {
@@ -232,6 +246,7 @@ mod tests {
             cuts: (0..3 * n).map(change).collect(),
             nodes: n.is_multiple_of(3).then(|| vec![[n as i16, -3, 9]; 40]),
             gone: (0..n as u32 % 4).collect(),
+            splits: (0..n as u32 % 3).map(|n| [n, 7, 40 + n]).collect(),
         };
         (0..200).map(of).collect()
     }

@@ -19,7 +19,7 @@ use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, SecondRecord};
 use trepan_render::{Camera, Frame, Image, Painter};
 use trepan_report::printable::capital;
-use trepan_runtime::film::{Shot, position};
+use trepan_runtime::film::{Shot, position, split_rest};
 use trepan_runtime::lockstep::up_to;
 use trepan_runtime::stop::Stop;
 use trepan_runtime::{View, arms};
@@ -87,6 +87,13 @@ impl Film {
             self.brain.fills.resize(self.brain.gone.len(), u16::MAX);
             (self.brain.gone[tet], self.brain.fills[tet]) = (forwards, if forwards { 0 } else { u16::MAX });
         }
+        if forwards {
+            self.brain.splits.extend(&shot.splits);
+            split_rest(&mut self.rest, &shot.splits);
+        } else if let Some(first) = shot.splits.first() {
+            self.brain.splits.truncate(self.brain.splits.len() - shot.splits.len());
+            self.rest.truncate(first.node as usize);
+        }
         self.bone.as_ref().map_or(0, |bone| shot.write(bone, forwards))
     }
 
@@ -96,7 +103,7 @@ impl Film {
         let before = self.shots.iter().enumerate().take(self.at + 1).rev().find_map(kept);
         let after = self.shots.iter().enumerate().skip(self.at + 1).find_map(kept);
         let nodes = |at: usize| self.shots.get(at).and_then(|shot| shot.nodes.as_ref());
-        let Some(from) = before.and_then(nodes) else { return };
+        let Some(from) = before.and_then(nodes).filter(|from| from.len() == self.rest.len()) else { return };
         let (to, share) = match (before, after, after.and_then(nodes)) {
             (Some(before), Some(after), Some(to)) => {
                 let span_ms = self.time_ms(after) - self.time_ms(before);
@@ -256,6 +263,7 @@ mod tests {
     use trepan_geometry::{Pose, ToolState};
     use trepan_link::SceneChange;
     use trepan_link::wire::TickRecord;
+    use trepan_mesh::Split;
     use trepan_runtime::film::displacements;
     use trepan_stages::haptic_tick::ToolSample;
     use trepan_volume::VoxelVolume;
@@ -284,11 +292,15 @@ mod tests {
         for n in 0..count {
             let at = [n % 40, n / 40, 1].map(|n| n as u16);
             let voxels = vec![SceneChange { at, before: 900, after: -1000 }];
-            let nodes = (n % 2 == 0).then(|| displacements(&[Vec3::X * 0.25 * n as f32], &[Vec3::ZERO]));
+            let many = if n < 100 { 1 } else { 2 };
+            let nodes = displacements(&vec![Vec3::X * 0.25 * n as f32; many], &[Vec3::ZERO; 2]);
+            let nodes = (n % 2 == 0).then_some(nodes);
             let gone = vec![n as u32];
-            sender.send(Shot { view: view(10.0 * n as f64), voxels, cuts: Vec::new(), nodes, gone }).unwrap();
+            let splits = (n == 100).then_some(Split { corner: 0, from: 0, node: 1 }).into_iter().collect();
+            sender.send(Shot { view: view(10.0 * n as f64), voxels, cuts: Vec::new(), nodes, gone, splits }).unwrap();
         }
-        let mut film = Film { shots: Vec::new(), coming, bone, at: 0, rest: vec![Vec3::ZERO], brain: Shape::default() };
+        let (shots, rest, brain) = (Vec::new(), vec![Vec3::ZERO], Shape::default());
+        let mut film = Film { shots, coming, bone, at: 0, rest, brain };
         film.grow();
         film.write(0, true);
         film
@@ -302,6 +314,8 @@ mod tests {
         for (time_ms, shot) in [(995.0, 99), (0.0, 0), (1990.0, 199), (501.0, 50), (500.0, 50), (-5.0, 0), (1e9, 199)] {
             film.go_to(time_ms);
             assert_eq!((film.at, gone()), (shot, shot + 1), "at {time_ms} ms");
+            let cut = usize::from(shot >= 100);
+            assert_eq!([film.brain.splits.len(), film.brain.positions.len()], [cut, 1 + cut], "at {time_ms} ms");
             assert_eq!(film.brain.gone.iter().filter(|gone| **gone).count(), shot + 1, "resected, at {time_ms} ms");
             assert!(
                 (4.0 * film.brain.positions[0].x - shot as f32).abs() < 1.0 + 1e-3,
