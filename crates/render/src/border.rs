@@ -101,6 +101,8 @@ struct Whole {
     known: BTreeSet<[u32; 3]>,
     /// Whether each node is on the boundary; empty without a cortex.
     is_rim: Vec<bool>,
+    /// The cortex at rest, its places and normals.
+    cortex: Vec<(Vec3, Vec3)>,
     embeddings: Vec<Embedding>,
     triangles: Vec<[u32; 3]>,
     looks: Vec<Vec4>,
@@ -112,6 +114,9 @@ struct CortexParts {
     looks: Vec<Vec4>,
     triangles: Vec<[u32; 3]>,
 }
+
+/// How far outside the cortex the middle of a wall's triangle may be, mm, numerical.
+const OUTSIDE_MM: f32 = 0.5;
 
 /// Stain of the dura.
 pub(crate) const DURA: f32 = -2.0;
@@ -180,12 +185,13 @@ impl Whole {
             let embeddings = embeddings(mesh, &fine.positions);
             let mut is_rim = vec![false; mesh.positions.len()];
             surface.triangles.iter().flatten().for_each(|n| is_rim[*n as usize] = true);
-            return Self { nodes, tets, faces: surface.triangles, known, is_rim, embeddings, triangles, looks };
+            let cortex = fine.positions.iter().copied().zip(normals).collect();
+            return Self { nodes, tets, faces: surface.triangles, known, is_rim, cortex, embeddings, triangles, looks };
         }
         let (embeddings, triangles) = on_nodes(&surface.triangles);
         let looks = vec![BARE; embeddings.len()];
-        let (known, is_rim) = Default::default();
-        Self { nodes, tets, faces: Vec::new(), known, is_rim, embeddings, triangles, looks }
+        let (known, is_rim, cortex) = Default::default();
+        Self { nodes, tets, faces: Vec::new(), known, is_rim, cortex, embeddings, triangles, looks }
     }
 }
 
@@ -226,6 +232,14 @@ impl Whole {
             made.triangles.push(corners.map(&mut of_side));
         }
         made
+    }
+
+    /// The way from a place at rest to the nearest vertex of the cortex, and how far outside of it
+    /// the place is, mm.
+    fn to_cortex(&self, from: Vec3) -> (Vec3, f32) {
+        let ways = self.cortex.iter().map(|(place, normal)| (*place - from, normal));
+        let nearest = ways.min_by(|a, b| a.0.length_squared().total_cmp(&b.0.length_squared()));
+        nearest.map_or((Vec3::ZERO, 0.0), |(way, normal)| (way, -way.dot(*normal)))
     }
 
     /// Whether two tetrahedra share a node at first and not any more.
@@ -346,9 +360,21 @@ impl Border {
         } else {
             self.faces.clone_from(&bared);
             bared.retain(|face| !whole.known.contains(&sorted(face.map(|n| node_of[n as usize]))));
-            let (walls, faces) = on_nodes(&bared);
-            let is_rim = |n: usize| whole.is_rim[node_of[walls[n].nodes[0] as usize] as usize];
-            self.walls = Walls::of(&faces, walls.len(), is_rim);
+            let (mut walls, mut faces) = on_nodes(&bared);
+            let is_rim = |wall: &Embedding| whole.is_rim[node_of[wall.nodes[0] as usize] as usize];
+            let rim: Vec<bool> = walls.iter().map(is_rim).collect();
+            // The tetrahedra reach over the cortex and its furrows: there walls would stand out.
+            walls.par_iter_mut().zip(&rim).filter(|(_, is_rim)| **is_rim).for_each(|(wall, _)| {
+                wall.offset = whole.to_cortex(wall.place(&self.rest)).0;
+            });
+            let is_within = |corners: &[u32; 3]| {
+                let middle = || corners.iter().map(|n| walls[*n as usize].place(&self.rest)).sum::<Vec3>() / 3.0;
+                corners.iter().all(|n| !rim[*n as usize]) || whole.to_cortex(middle()).1 < OUTSIDE_MM
+            };
+            let within: Vec<bool> = faces.par_iter().map(is_within).collect();
+            let mut within = within.into_iter();
+            faces.retain(|_| within.next() != Some(false));
+            self.walls = Walls::of(&faces, walls.len(), |n| rim[n]);
             self.first_wall = cortex.embeddings.len();
             let first = self.first_wall as u32;
             cortex.triangles.extend(faces.into_iter().map(|corners| corners.map(|n| n + first)));
