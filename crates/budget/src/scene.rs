@@ -41,7 +41,8 @@ pub struct Scene {
     pub material: Material,
     /// Rate of the haptic device, Hz.
     pub device_rate_hz: f64,
-    /// Required speed of the tissue over real time, at least 1; the excess absorbs other load.
+    /// Required speed of the tissue over real time on all threads that it may have, at least 1; the
+    /// excess absorbs other load.
     pub headroom: f64,
     /// Pixels of the 3-D view, width and height.
     pub picture_pixels: [u32; 2],
@@ -109,6 +110,11 @@ impl Scene {
             ("scene.view_mm", self.view_mm),
             ("scene.pictures_per_s", self.pictures_per_s),
         ]
+    }
+
+    /// Pixels of the 3-D view.
+    pub(crate) fn pixels(&self) -> f64 {
+        self.picture_pixels.map(f64::from).iter().product()
     }
 
     /// Features of the bone error: the logarithms of radius, depth and CT voxel, mm.

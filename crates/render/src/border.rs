@@ -13,7 +13,7 @@ use crate::walls::Walls;
 use crate::{Leaves, RenderError};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use trepan_mesh::{NONE, Split, Surface, TetMesh};
 
@@ -59,6 +59,10 @@ pub(crate) struct Border {
     pub own: usize,
     /// Vertices of the dura, after the brain's.
     leaves: usize,
+    /// Way from nodes of the boundary to the cortex at rest, mm, where walls ended.
+    to_cortex: BTreeMap<u32, Vec3>,
+    /// Whether walls with these nodes lie within the cortex.
+    within: BTreeMap<[u32; 3], bool>,
     /// Vertices that lie on what a tool touches.
     touched: Vec<u32>,
     /// The nodes' stains, as they were given last.
@@ -80,10 +84,11 @@ pub(crate) struct Changes {
     pub triangles: Vec<u32>,
 }
 
-/// Motion of a node that is not followed, mm, numerical: a third of a pixel of 1280x800 from near.
+/// Motion of a node that is not followed, mm, numerical: a third of a pixel of 1280x800 where the
+/// view is 75 mm wide.
 const STILL_MM: f32 = 0.03;
 
-/// Nodes or triangles over those that changed from which on all count as changed, numerical.
+/// All nodes or triangles count as changed once one in so many did, numerical.
 const MOST: usize = 2;
 
 /// Whether a place is so near to where it was that it may stay there.
@@ -289,6 +294,8 @@ impl Border {
             stains: Vec::new(),
             own: 0,
             leaves: 0,
+            to_cortex: BTreeMap::new(),
+            within: BTreeMap::new(),
             touched: Vec::new(),
             stained: None,
             changes: Changes::default(),
@@ -361,19 +368,7 @@ impl Border {
             self.faces.clone_from(&bared);
             bared.retain(|face| !whole.known.contains(&sorted(face.map(|n| node_of[n as usize]))));
             let (mut walls, mut faces) = on_nodes(&bared);
-            let is_rim = |wall: &Embedding| whole.is_rim[node_of[wall.nodes[0] as usize] as usize];
-            let rim: Vec<bool> = walls.iter().map(is_rim).collect();
-            // The tetrahedra reach over the cortex and its furrows: there walls would stand out.
-            walls.par_iter_mut().zip(&rim).filter(|(_, is_rim)| **is_rim).for_each(|(wall, _)| {
-                wall.offset = whole.to_cortex(wall.place(&self.rest)).0;
-            });
-            let is_within = |corners: &[u32; 3]| {
-                let middle = || corners.iter().map(|n| walls[*n as usize].place(&self.rest)).sum::<Vec3>() / 3.0;
-                corners.iter().all(|n| !rim[*n as usize]) || whole.to_cortex(middle()).1 < OUTSIDE_MM
-            };
-            let within: Vec<bool> = faces.par_iter().map(is_within).collect();
-            let mut within = within.into_iter();
-            faces.retain(|_| within.next() != Some(false));
+            let rim = self.end_walls(&mut walls, &mut faces, &node_of);
             self.walls = Walls::of(&faces, walls.len(), |n| rim[n]);
             self.first_wall = cortex.embeddings.len();
             let first = self.first_wall as u32;
@@ -384,6 +379,32 @@ impl Border {
         }
         self.shown();
         true
+    }
+
+    /// Lets walls end at the cortex, over which and over whose furrows the tetrahedra reach; there
+    /// they would stand out. Returns which of their vertices are on the boundary.
+    ///
+    /// Costs 0.14 ms for each new triangle, and for each new vertex at the boundary.
+    fn end_walls(&mut self, walls: &mut [Embedding], faces: &mut Vec<[u32; 3]>, node_of: &[u32]) -> Vec<bool> {
+        let (whole, rest) = (&self.whole, &self.rest);
+        let nodes: Vec<u32> = walls.iter().map(|wall| node_of[wall.nodes[0] as usize]).collect();
+        let rim: Vec<bool> = nodes.iter().map(|node| whole.is_rim[*node as usize]).collect();
+        let at_rim = || nodes.par_iter().zip(&rim).filter(|(_, is_rim)| **is_rim).map(|(node, _)| *node);
+        let new: BTreeSet<u32> = at_rim().filter(|node| !self.to_cortex.contains_key(node)).collect();
+        self.to_cortex.par_extend(new.into_par_iter().map(|node| (node, whole.to_cortex(rest[node as usize]).0)));
+        for (wall, node) in walls.iter_mut().zip(&nodes) {
+            wall.offset = self.to_cortex.get(node).copied().unwrap_or_default();
+        }
+        let of = |corners: &[u32; 3]| sorted(corners.map(|n| nodes[n as usize]));
+        let new = faces.par_iter().filter(|corners| !self.within.contains_key(&of(corners)));
+        let judged = new.map(|corners| {
+            let middle = corners.iter().map(|n| walls[*n as usize].place(rest)).sum::<Vec3>() / 3.0;
+            (of(corners), whole.to_cortex(middle).1 < OUTSIDE_MM)
+        });
+        let judged: Vec<([u32; 3], bool)> = judged.collect();
+        self.within.extend(judged);
+        faces.retain(|corners| self.within.get(&of(corners)) != Some(&false));
+        rim
     }
 
     /// Covers the brain by the dura; returns whether other triangles are there than before.
@@ -582,6 +603,42 @@ mod tests {
             &trepan_mesh::lattice::Config { target_tets: 6 * wide * wide * deep, ..Default::default() },
         )
         .expect("a box has a mesh")
+    }
+
+    #[test]
+    fn walls_of_a_hole_end_at_the_cortex() {
+        let mesh = block(10, 4);
+        let top = mesh.bounds().max.z;
+        // 1 mm below the tetrahedra's boundary, with a furrow of 4 mm across it.
+        let mut surface = TriMesh::default();
+        let furrow = |x: f32| if (x - 20.0).abs() < 2.0 { 6.0 } else { 0.0 };
+        for at in 0..1681u32 {
+            let (x, y) = ((at % 41) as f32, (at / 41) as f32);
+            surface.positions.push(Vec3::new(x, y, top - 1.0 - furrow(x)));
+            if at % 41 < 40 && at < 1640 {
+                surface.triangles.extend([[at, at + 1, at + 42], [at, at + 42, at + 41]]);
+            }
+        }
+        let depth_mm: Vec<f32> = surface.positions.iter().map(|p| top - p.z).collect();
+        let mut border = Border::of(&mesh, Some(&Cortex { surface: &surface, depth_mm: &depth_mm }));
+        let far = |tet: &[u32; 4]| {
+            let middle = tet.iter().map(|n| mesh.positions[*n as usize]).sum::<Vec3>() / 4.0;
+            middle.distance(Vec3::new(21.0, 20.0, top))
+        };
+        let gone: Vec<bool> = mesh.tets.iter().map(|tet| far(tet) < 9.0).collect();
+        assert!(border.leave_out(Some(&gone), &[]));
+        let walls = &border.at_rest[border.first_wall..];
+        let most = walls.iter().map(|p| p.z).fold(f32::NEG_INFINITY, f32::max);
+        assert!(walls.len() > 40 && most < top - 0.95, "{} of them up to {most}, {top}", walls.len());
+        let of_walls = border.triangles.iter().filter(|t| t.iter().all(|n| *n as usize >= border.first_wall));
+        let middles = of_walls.map(|t| t.iter().map(|n| border.at_rest[*n as usize]).sum::<Vec3>() / 3.0);
+        let out = |p: &Vec3| p.z - (top - 1.0 - furrow(p.x));
+        // Walls are smoothed afterwards, by a part of an edge.
+        assert!(
+            middles.clone().count() > 60 && middles.clone().all(|p| out(&p) < 2.0),
+            "{:?}",
+            middles.map(|p| out(&p)).fold(0.0, f32::max)
+        );
     }
 
     #[test]

@@ -97,16 +97,6 @@ impl NodeState {
         Self { positions: mesh.positions.clone(), velocities: vec![Vec3::ZERO; mesh.positions.len()] }
     }
 
-    /// Adds copies of nodes, each where its node is.
-    pub fn split(&mut self, splits: &[Split]) {
-        for Split { from, node, .. } in splits {
-            if *node as usize == self.positions.len() {
-                self.positions.push(self.positions[*from as usize]);
-                self.velocities.push(self.velocities[*from as usize]);
-            }
-        }
-    }
-
     /// Rounds the state of a node.
     pub(crate) fn set(&mut self, node: usize, position: DVec3, velocity: DVec3) {
         (self.positions[node], self.velocities[node]) = (position.as_vec3(), velocity.as_vec3());

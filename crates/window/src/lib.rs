@@ -82,6 +82,7 @@ pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeli
 pub use surface::{Ray, SurfaceHit};
 pub use words::{Language, missing, speak, tr};
 
+use eframe::egui::style::Widgets;
 use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -230,7 +231,8 @@ fn open_on(title: &str, gpu: Option<&Gpu>, size: [f32; 2], create: &Create<'_>) 
         let create: eframe::AppCreator<'_> = Box::new(|context| {
             context.egui_ctx.set_theme(eframe::egui::Theme::Dark);
             context.egui_ctx.all_styles_mut(readable);
-            if gpu.is_none_or(Gpu::is_software) {
+            let kind = context.wgpu_render_state.as_ref().map(|state| state.adapter.get_info().device_type);
+            if kind == Some(eframe::wgpu::DeviceType::Cpu) {
                 context.egui_ctx.all_styles_mut(square);
             }
             Ok(create(gpu))
@@ -257,8 +259,8 @@ fn readable(style: &mut eframe::egui::Style) {
 /// Gives widgets square corners: a software driver spends twice as long on the slender triangles
 /// of round ones as on all else of the panel.
 fn square(style: &mut eframe::egui::Style) {
-    let of = &mut style.visuals.widgets;
-    for widget in [&mut of.noninteractive, &mut of.inactive, &mut of.hovered, &mut of.active, &mut of.open] {
+    let Widgets { noninteractive, inactive, hovered, active, open } = &mut style.visuals.widgets;
+    for widget in [noninteractive, inactive, hovered, active, open] {
         widget.corner_radius = 0.into();
     }
 }
@@ -281,10 +283,6 @@ fn options(gpu: Option<&Gpu>, [width, height]: [f32; 2]) -> eframe::NativeOption
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
-    if gpu.is_none_or(Gpu::is_software) {
-        // A picture that comes late shall not wait for the display's next one too.
-        options.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
-    }
     if let Some(gpu) = gpu {
         let shared = eframe::egui_wgpu::WgpuSetupExisting {
             instance: gpu.instance().clone(),

@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_stands_keeps_half_of_its_pixels_on_the_processor() {
+    fn a_view_that_stands_keeps_half_of_an_edge_on_the_processor() {
         for (software, coarsest) in [(true, 0.5), (false, 0.16)] {
             let mut quality = Quality::new(software, 1.0);
             let mut now = 0.0;

@@ -29,7 +29,7 @@ pub const NODE_STEP_MM: f32 = 1.0 / 256.0;
 const MOST_CHANGES: usize = 400_000;
 /// A chunk is closed when it spans this much session time, ms.
 const CHUNK_MS: f64 = 1000.0;
-/// Stands between tetrahedra and splits.
+/// Stands between tetrahedra and splits, which older programs do not read.
 const NO_TET: u32 = u32::MAX;
 /// Name of the layout of messages.
 const LAYOUT: &str = "trepan.scene.1";

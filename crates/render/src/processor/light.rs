@@ -171,8 +171,18 @@ fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
 
 /// Whether a tool may take light from a point of a ball.
 pub(crate) fn is_shaded(light: Vec3, middle: Vec3, radius_mm: f32, tool: &ToolShape) -> bool {
-    let is_near = |[gap, way]: [f32; 2]| gap - radius_mm < 0.10 * (way + radius_mm) + 0.3;
-    tool.tip.w >= 0.0 && gaps(light, middle, tool.tip, tool.tail).into_iter().any(is_near)
+    let [to, end] = [tool.tip, tool.tail].map(|point| point.truncate() - middle);
+    let axis = end - to;
+    let from_beam = |to: Vec3| (to - to.dot(light).max(0.0) * light).length();
+    // Nowhere in the ball is a gap smaller than the distance of beam and shaft less its radius.
+    let across = axis - axis.dot(light) * light;
+    let nearest = [to.dot(across) / across.length_squared().max(1e-6), to.dot(axis) / axis.length_squared().max(1e-6)];
+    let places = nearest.map(|share| (-share).clamp(0.0, 1.0)).into_iter().chain([0.0, 1.0]);
+    let distance = places.map(|share| from_beam(to + share * axis)).fold(f32::INFINITY, f32::min);
+    let way = to.dot(light).max(end.dot(light)).max(0.0);
+    let is_near = |gap: f32, way: f32| gap - radius_mm < 0.10 * (way + radius_mm) + 0.3;
+    let by_ball = is_near(from_beam(to) - tool.tip.w, to.dot(light).max(0.0));
+    tool.tip.w >= 0.0 && (by_ball || is_near(distance - tool.tail.w, way))
 }
 
 /// Distances of a tool's ball and shaft from the beam to a point, and how far along it they are.
@@ -258,5 +268,32 @@ fn tool_colour(p: Vec3, tool: &ToolShape) -> Vec3 {
         TUBE if p.z < BORE_MM && p.truncate().length() < 0.56 * tool.tail.w => Vec3::splat(0.02),
         TINES if p.z > 8.0 => Vec3::new(0.13, 0.22, 0.42),
         _ => Vec3::new(0.62, 0.66, 0.72),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_tool_shades_lies_in_balls_that_it_may_shade() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut number = |low: f32, high: f32| low + (high - low) * random.f32();
+        let mut shaded = 0;
+        for n in 0..20_000 {
+            let mut vector = |size: f32| Vec3::new(number(-size, size), number(-size, size), number(-size, size));
+            let (light, tip, middle) = (vector(1.0).normalize_or(Vec3::Z), vector(30.0), vector(30.0));
+            // Every second shaft points towards the lamp, or nearly so.
+            let aside = if n % 2 == 0 { 0.3 } else { 2.0 };
+            let tail = tip + 120.0 * (light + aside * vector(1.0)).normalize_or(Vec3::X);
+            let (radius_mm, offset) = (3.0, vector(1.0).normalize_or(Vec3::Y));
+            let point = middle + 0.99 * radius_mm * offset;
+            let tool = ToolShape { tip: tip.extend(1.5), tail: tail.extend(2.0), ..ToolShape::NONE };
+            if past(light, point, tool.tip, tool.tail) < 1.0 {
+                shaded += 1;
+                assert!(is_shaded(light, middle, radius_mm, &tool), "{n}: {light} {tip} {tail} {middle} {point}");
+            }
+        }
+        assert!(shaded > 500, "{shaded}");
     }
 }

@@ -6,9 +6,10 @@
 //! reference for the shaders, and the renderer for machines without a driver.
 //!
 //! # Practice
-//! Rows are shared between as many threads as there are processors. Four optimisations are not in
+//! Rows are shared between as many threads as there are processors. Five optimisations are not in
 //! the shaders. While the camera stands still only tiles in which something changed are drawn
-//! again, and slices only while what they show changes (`reuse.rs`). Each tile of 8x8 pixels first
+//! again, and slices only while what they show changes (`reuse.rs`); a tool's shadow is computed in
+//! tiles where it may fall. Each tile of 8x8 pixels first
 //! advances as one beam to where bone may be. Rays skip by the octant of their direction and test
 //! a cell only if its occupancy bit is set (`bricks.rs`). While the camera moves, rays are sparse
 //! ([`Casting::sparse`]): a quarter of the pixels, and the others where neighbouring tangent

@@ -14,7 +14,7 @@ use trepan_geometry::{Pose, Quat, Tool};
 use trepan_render::{Camera, Casting, Frame, Image, ProcessorRenderer, SceneData, SliceLook};
 
 /// Fractions of pixels along an edge that the window uses, and 1.
-const DETAILS: [f32; 5] = [1.0, 0.75, 0.55, 0.4, 0.3];
+const DETAILS: [f32; 5] = [1.0, 0.75, 0.5, 0.4, 0.3];
 
 /// The built-in head with its brain, drawn moving and at rest.
 pub fn run(scope: Scope, findings: &mut Findings) {
