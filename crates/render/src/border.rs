@@ -422,7 +422,7 @@ impl Border {
             self.triangles.truncate(self.own);
             self.triangles.extend(moved);
             self.chunks.truncate(self.own.div_ceil(MANY));
-            self.chunks.push(Chunk::anywhere(self.own..self.triangles.len()));
+            self.chunks.push(Chunk::anywhere(&self.triangles, self.own));
             self.leaves = wanted;
             self.at_rest.resize(brain + wanted, Vec3::ZERO);
             self.places.resize(brain + wanted, Vec3::ZERO);

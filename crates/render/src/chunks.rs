@@ -1,7 +1,9 @@
 //! Neighbouring triangles in chunks, with a ball around each: what a plane misses costs nothing.
 
 use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 use std::ops::Range;
+use trepan_mesh::NONE;
 
 /// Triangles of a chunk, numerical.
 pub(crate) const MANY: usize = 64;
@@ -12,6 +14,8 @@ const EDGE_MM: f32 = 8.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
     pub triangles: Range<usize>,
+    /// Their corners, hardly any of them twice.
+    pub vertices: Vec<u32>,
     /// The ball around them at rest, world mm.
     middle: Vec3,
     radius_mm: f32,
@@ -26,17 +30,19 @@ impl Chunk {
     /// Chunks of all triangles, over vertices at rest.
     pub fn all(triangles: &[[u32; 3]], at_rest: &[Vec3]) -> Vec<Self> {
         let chunk = |(n, some): (usize, &[[u32; 3]])| {
-            let places = || some.iter().flatten().map(|n| at_rest[*n as usize]);
-            let middle = places().sum::<Vec3>() / (3 * some.len()) as f32;
+            let vertices = few(some);
+            let places = || vertices.iter().map(|n| at_rest[*n as usize]);
+            let middle = places().sum::<Vec3>() / vertices.len() as f32;
             let radius_mm = places().map(|place| place.distance(middle)).fold(0.0, f32::max);
-            Self { triangles: MANY * n..MANY * n + some.len(), middle, radius_mm }
+            Self { triangles: MANY * n..MANY * n + some.len(), vertices, middle, radius_mm }
         };
-        triangles.chunks(MANY).enumerate().map(chunk).collect()
+        triangles.par_chunks(MANY).enumerate().map(chunk).collect()
     }
 
-    /// A chunk that may lie anywhere.
-    pub fn anywhere(triangles: Range<usize>) -> Self {
-        Self { triangles, middle: Vec3::ZERO, radius_mm: f32::INFINITY }
+    /// The last triangles as a chunk that may lie anywhere.
+    pub fn anywhere(triangles: &[[u32; 3]], first: usize) -> Self {
+        let vertices = few(&triangles[first..]);
+        Self { triangles: first..triangles.len(), vertices, middle: Vec3::ZERO, radius_mm: f32::INFINITY }
     }
 
     /// Whether it may cross a plane, moved by so much at most, mm.
@@ -46,9 +52,29 @@ impl Chunk {
     }
 }
 
+/// The corners of triangles, without most of those that were there shortly before.
+fn few(triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut before = [NONE; 2 * MANY];
+    let is_new = |n: &u32| std::mem::replace(&mut before[*n as usize % (2 * MANY)], *n) != *n;
+    triangles.iter().flatten().copied().filter(is_new).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_chunk_names_each_corner_of_its_triangles() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut triangle = || [0; 3].map(|_| random.u32(0..400));
+        let triangles: Vec<[u32; 3]> = (0..500).map(|_| triangle()).collect();
+        let at_rest = vec![Vec3::ONE; 400];
+        for chunk in Chunk::all(&triangles, &at_rest).into_iter().chain([Chunk::anywhere(&triangles, 450)]) {
+            let mut corners = triangles[chunk.triangles.clone()].iter().flatten();
+            assert!(corners.all(|n| chunk.vertices.contains(n)));
+            assert!(chunk.vertices.len() <= 3 * chunk.triangles.len());
+        }
+    }
 
     #[test]
     fn no_triangle_is_cut_outside_what_its_chunk_says() {

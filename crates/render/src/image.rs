@@ -89,7 +89,7 @@ struct Between {
     /// The one after, within the picture.
     second: usize,
     /// Weight of the second, of 256.
-    share: u32,
+    share: u16,
 }
 
 impl<'a> Enlarge<'a> {
@@ -109,14 +109,16 @@ impl<'a> Enlarge<'a> {
         let columns = &self.columns[columns];
         let [Some(left), Some(right)] = [columns.first(), columns.last()] else { return };
         let (start, end) = (left.first, right.second + 1);
-        // The two rows are mixed first: they have fewer pixels.
+        // The two rows are mixed first: they have fewer pixels. All numbers fit 16 bits.
         let mixed = upper[start..end].iter().zip(&lower[start..end]);
-        let down: Vec<[u32; 4]> = mixed
-            .map(|(a, b)| [0, 1, 2, 3].map(|c| u32::from(a[c]) * (256 - share) + u32::from(b[c]) * share))
-            .collect();
+        let (from, by) = (256 - share, share);
+        let down: Vec<[u16; 4]> =
+            mixed.map(|(a, b)| [0, 1, 2, 3].map(|c| u16::from(a[c]) * from + u16::from(b[c]) * by)).collect();
+        let part = |colour: u16, share: u16| ((u32::from(colour) * u32::from(share)) >> 16) as u16;
         for (pixel, at) in to.iter_mut().zip(columns) {
             let (a, b) = (down[at.first - start], down[at.second - start]);
-            *pixel = [0, 1, 2, 3].map(|c| ((a[c] * (256 - at.share) + b[c] * at.share + (1 << 15)) >> 16) as u8);
+            let (from, by) = (u16::MAX - (at.share << 8), at.share << 8);
+            *pixel = [0, 1, 2, 3].map(|c| ((part(a[c], from) + part(b[c], by) + 129) >> 8) as u8);
         }
     }
 
@@ -140,7 +142,7 @@ impl Between {
         let between = |at: f32| Self {
             first: at as usize,
             second: (at as usize + 1).min(last as usize),
-            share: (256.0 * at.fract()).round() as u32,
+            share: (256.0 * at.fract()).round().min(255.0) as u16,
         };
         (0..to).map(at).map(between).collect()
     }

@@ -3,7 +3,7 @@
 //! # Practice
 //! Contact is with the boundary of the tetrahedra, which closes the sulci, as does the arachnoid.
 //! Where a tool touches it, the cortex beside the tool is drawn onto it, and less so further away:
-//! no tool floats over a sulcus or sinks in. Costs a closest point for each pair of face and vertex
+//! no tool floats over a sulcus or sinks in. Costs at most a closest point for each face and vertex
 //! near the tool.
 
 use glam::Vec3;
@@ -14,6 +14,21 @@ use trepan_geometry::{Aabb, closest_weights};
 const NEAR_MM: [f32; 2] = [3.0, 9.0];
 /// Gaps between a tip and what it meets from which on it touches, and none of it, mm, numerical.
 const GAP_MM: [f32; 2] = [0.5, 2.0];
+
+/// A face and the ball around it, mm.
+struct Face {
+    corners: [Vec3; 3],
+    middle: Vec3,
+    radius_mm: f32,
+}
+
+impl Face {
+    fn of(corners: [Vec3; 3]) -> Self {
+        let middle = corners.iter().sum::<Vec3>() / 3.0;
+        let radius_mm = corners.map(|corner| corner.distance(middle)).into_iter().fold(0.0, f32::max);
+        Self { corners, middle, radius_mm }
+    }
+}
 
 /// Moves the places near balls, with their radii, mm, onto the faces that these touch; returns
 /// which.
@@ -27,13 +42,21 @@ pub(crate) fn touch(places: &mut [Vec3], faces: &[[u32; 3]], nodes: &[Vec3], bal
             let of = Aabb::of_points(corners);
             of.min.cmple(around.max).all() && of.max.cmpge(around.min).all()
         };
-        let near: Vec<[Vec3; 3]> = faces.iter().map(corners).filter(meets).collect();
+        let near: Vec<Face> = faces.iter().map(corners).filter(meets).map(Face::of).collect();
         let onto = |place: Vec3| {
-            let on = near.iter().map(|face| {
-                let weights = closest_weights(*face, place);
-                (0..3).map(|k| weights[k] * face[k]).sum::<Vec3>()
-            });
-            on.min_by(|a, b| a.distance_squared(place).total_cmp(&b.distance_squared(place)))
+            let mut nearest = (f32::INFINITY, None);
+            for face in &near {
+                if face.middle.distance(place) - face.radius_mm > nearest.0 {
+                    continue;
+                }
+                let weights = closest_weights(face.corners, place);
+                let on = (0..3).map(|k| weights[k] * face.corners[k]).sum::<Vec3>();
+                let away_mm = on.distance(place);
+                if away_mm < nearest.0 {
+                    nearest = (away_mm, Some(on));
+                }
+            }
+            nearest.1
         };
         let Some(met) = onto(middle) else { continue };
         let touches = 1.0 - step(GAP_MM, met.distance(middle) - radius_mm);

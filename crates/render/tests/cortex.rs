@@ -123,6 +123,26 @@ fn a_section_shows_tissue_and_not_what_is_between_its_folds() {
     assert!((shown / whole - tissue / ball).abs() < 0.03, "{shown} of {whole}, {tissue} of {ball}");
 }
 
+#[test]
+fn a_cortex_of_which_most_is_interpolated_looks_the_same() {
+    let (surface, depth_mm, [mesh, _]) = brain();
+    let cortex = Some(Cortex { surface: &surface, depth_mm: &depth_mm });
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: None, tint: None, cortex };
+    let [exact, sparse] = [false, true].map(|sparse| {
+        let mut renderer = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
+        renderer.set_casting(Casting { sparse, ..Casting::default() });
+        renderer.draw(&frame()).expect("drawn");
+        renderer.image().clone()
+    });
+    let pixels = || exact.rgba.chunks(4).zip(sparse.rgba.chunks(4));
+    let most = |(a, b): (&[u8], &[u8])| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap_or(0);
+    let over = |least: u8| pixels().filter(|pair| most(*pair) > least).count();
+    assert!(over(0) * 20 > pixels().count(), "{} pixels were interpolated: it tests nothing", over(0));
+    // 99 % differ by no more than a screen shows, one in ten thousand clearly.
+    let are_few = over(3) * 100 < pixels().count() && over(40) * 10_000 < pixels().count();
+    assert!(are_few, "{} and {} are off", over(3), over(40));
+}
+
 /// The brain pressed in around a place, by so much there and not at all beyond 12 mm.
 fn pressed(mesh: &TetMesh, at: Vec3, mm: f32) -> Vec<Vec3> {
     let share = |p: &Vec3| f32::from(u8::from(p.distance(at) < 12.0));

@@ -11,6 +11,7 @@ use crate::bricks::NOTHING;
 use crate::camera::View;
 use crate::chunks::Chunk;
 use crate::cut::height;
+use crate::mix::{greater, lesser};
 use crate::section::{self, Corner};
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -51,6 +52,10 @@ const BANDS: usize = 2;
 
 /// The bit of what turns its back where a closed cortex is cut: the cut is seen there.
 const BACK: u32 = 1 << 31;
+
+/// Share of its depth by which a surface that goes on evenly leaves the plane of its neighbours,
+/// numerical: 0.1 mm at the operating distance.
+const EVEN: f32 = 5e-4;
 
 const NOWHERE: Meeting = Meeting { nearness: 0.0, triangle: 0, weights: [0.0; 2] };
 
@@ -106,7 +111,25 @@ impl Fragments {
 
     /// Distance along the ray at a pixel, mm, or [`NOTHING`].
     pub fn t(&self, brain: Option<&Border>, pixel: usize) -> f32 {
-        self.at(brain, pixel).t
+        let Meeting { nearness, triangle, weights: [v, w] } = self.nearest[pixel];
+        let Some(brain) = brain.filter(|_| nearness > 0.0 && triangle & BACK == 0) else { return NOTHING };
+        if triangle >= self.first_cut {
+            return self.at(Some(brain), pixel).t;
+        }
+        let corners = brain.triangles[triangle as usize].map(|n| brain.places[n as usize]);
+        ((1.0 - v - w) * corners[0] + v * corners[1] + w * corners[2]).distance(self.eye)
+    }
+
+    /// The look of the cortex at a pixel, if it goes on evenly there between others.
+    pub fn even_look(&self, brain: &Border, pixel: usize, others: [usize; 4]) -> Option<Vec4> {
+        let Meeting { nearness, triangle, weights: [v, w] } = self.nearest[pixel];
+        // What is cut or turns its back has larger numbers.
+        let is_cortex = |n: &usize| self.nearest[*n].nearness > 0.0 && (self.nearest[*n].triangle as usize) < brain.own;
+        let mean = 0.25 * others.iter().map(|n| self.nearest[*n].nearness).sum::<f32>();
+        let is_even = (mean - nearness).abs() < EVEN * nearness && is_cortex(&pixel) && others.iter().all(is_cortex);
+        let corners = is_even.then(|| brain.triangles[triangle as usize])?;
+        let looks = corners.map(|n| brain.looks[n as usize]);
+        Some((1.0 - v - w) * looks[0] + v * looks[1] + w * looks[2])
     }
 
     /// What is seen at a pixel of the brain that was drawn last.
@@ -188,7 +211,7 @@ impl Fragments {
         let seen = |place: &Vec3| Vertex::seen(view, size, *place);
         border.places.par_iter().map(seen).collect_into_vec(&mut self.vertices);
         let vertices = &self.vertices;
-        border.chunks.par_iter().map(|chunk| around(border, chunk, vertices)).collect_into_vec(&mut self.boxes);
+        border.chunks.par_iter().map(|chunk| around(chunk, vertices)).collect_into_vec(&mut self.boxes);
     }
 
     /// Projects the vertices that moved; marks where a triangle looks different.
@@ -206,7 +229,7 @@ impl Fragments {
             let some = changes.triangles[next..].iter().take_while(|n| (**n as usize) < chunk.triangles.end).count();
             next += some;
             if some > 0 {
-                *bounds = around(border, chunk, &self.vertices);
+                *bounds = around(chunk, &self.vertices);
             }
         }
     }
@@ -278,10 +301,12 @@ impl Fragments {
 }
 
 /// The box around a chunk's triangles in the view, without what is behind the eye.
-fn around(border: &Border, chunk: &Chunk, vertices: &[Vertex]) -> [Vec2; 2] {
-    let corners = border.triangles[chunk.triangles.clone()].iter().flatten().map(|n| &vertices[*n as usize]);
+fn around(chunk: &Chunk, vertices: &[Vertex]) -> [Vec2; 2] {
+    let corners = chunk.vertices.iter().map(|n| &vertices[*n as usize]);
     let before = corners.filter(|vertex| vertex.nearness > 0.0 && vertex.at.is_finite());
-    before.fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], v| [low.min(v.at), high.max(v.at)])
+    let least = |a: Vec2, b: Vec2| Vec2::new(lesser(a.x, b.x), lesser(a.y, b.y));
+    let most = |a: Vec2, b: Vec2| Vec2::new(greater(a.x, b.x), greater(a.y, b.y));
+    before.fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], v| [least(low, v.at), most(high, v.at)])
 }
 
 /// Rows at which so many bands begin and end, with as many chunks each.
@@ -338,35 +363,37 @@ impl Band<'_> {
         }
         let edges = [(b, c - b), (c, a - c), (a, b - a)];
         let (least, sign) = (Vec4::ZERO, Vec4::splat(double_area.signum()));
+        // Perspective-correct interpolation: attributes are divided by depth.
+        let scales = corners.map(|corner| corner.nearness / double_area);
+        let mark = if is_back && side == Side::Marked { BACK } else { 0 };
         for y in lines {
             let line = y as i32 as f32 + 0.5;
+            let row = &mut self.nearest[self.width * (y - self.rows.start)..][..self.width];
             for first in columns.clone().step_by(4) {
                 let middles = Vec4::splat(first as i32 as f32) + Vec4::new(0.5, 1.5, 2.5, 3.5);
                 // Twice the area between each edge and the middles of four pixels.
                 let twice = edges.map(|(from, to)| Vec4::splat(to.x * (line - from.y)) - to.y * (middles - from.x));
                 let [a, b, c] = twice.map(|w| (w * sign).cmplt(least));
-                let inside = !(a | b | c).bitmask() & ((1 << (columns.end - first).min(4)) - 1);
-                if inside == 0 {
+                let row = &mut row[first..columns.end.min(first + 4)];
+                let mut seen = !(a | b | c).bitmask() & ((1 << row.len()) - 1);
+                if seen == 0 {
                     continue;
                 }
-                let twice = twice.map(|w| w.to_array());
-                for lane in (0..4).filter(|lane| inside & (1 << lane) != 0) {
-                    let flat = twice.map(|w| w[lane] / double_area);
-                    // Perspective-correct interpolation: attributes are divided by depth.
-                    let over = [0, 1, 2].map(|n| flat[n] * corners[n].nearness);
-                    let nearness = over.iter().sum::<f32>();
-                    let nearest = &mut self.nearest[first + lane + self.width * (y - self.rows.start)];
-                    let is_hidden = match side {
-                        Side::Cut => nearest.triangle & BACK == 0 || nearest.nearness <= 0.0,
-                        _ => nearness <= nearest.nearness,
-                    };
-                    if is_hidden {
-                        continue;
-                    }
-                    let weights = over.map(|over| over / nearness);
-                    if is_left(weights) {
-                        let mark = if is_back && side == Side::Marked { BACK } else { 0 };
-                        *nearest = Meeting { nearness, triangle: number | mark, weights: [weights[1], weights[2]] };
+                let over = [0, 1, 2].map(|n| twice[n] * scales[n]);
+                let nearness = over[0] + over[1] + over[2];
+                if side != Side::Cut {
+                    let before = Vec4::from([0, 1, 2, 3].map(|n| row.get(n).map_or(0.0, |m| m.nearness)));
+                    seen &= nearness.cmpgt(before).bitmask();
+                }
+                while seen != 0 {
+                    let lane = seen.trailing_zeros() as usize;
+                    seen &= seen - 1;
+                    let nearest = &mut row[lane];
+                    let is_hidden = side == Side::Cut && (nearest.triangle & BACK == 0 || nearest.nearness <= 0.0);
+                    let weights = over.map(|over| over[lane] / nearness[lane]);
+                    if !is_hidden && is_left(weights) {
+                        let weights = [weights[1], weights[2]];
+                        *nearest = Meeting { nearness: nearness[lane], triangle: number | mark, weights };
                     }
                 }
             }

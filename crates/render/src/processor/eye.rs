@@ -194,16 +194,22 @@ impl EyeHits {
                 tiles.spans(y).flatten().for_each(|x| row[x] = exact([x, y], &[]));
             });
         }
-        // Interpolates between colours of smooth, unoccluded bone.
+        // Interpolates between colours of smooth, unoccluded bone or cortex.
         let bone = |at: usize| rays[at].t < fragments.t(brain, at);
+        let plain = inputs.brain_paint.is_none();
         rows::sparsely(threads, &mut self.pixels, width, tiles, exact, |[x, y], around| {
             let at = x + width * y;
             let (aside, off) = (x % 2, y % 2 * width);
-            let corners = || [at - aside - off, at + aside - off, at - aside + off, at + aside + off];
-            let smooth = rays[at].is_between()
-                && drawn.near([x, y])[0] == [false; 2]
-                && bone(at)
-                && corners().into_iter().all(bone);
+            let corners = [at - aside - off, at + aside - off, at - aside + off, at + aside + off];
+            let cortex = |brain| {
+                let look = (plain && are_alike(around)).then(|| fragments.even_look(brain, at, corners)).flatten();
+                look.is_some_and(|look| !light::has_vessel(look)) && !bone(at) && !corners.into_iter().any(bone)
+            };
+            let smooth = drawn.near([x, y])[0] == [false; 2]
+                && match rays[at].is_between() && bone(at) {
+                    true => corners.into_iter().all(bone),
+                    false => brain.is_some_and(cortex),
+                };
             smooth.then(|| mean(around))
         });
     }
@@ -241,6 +247,15 @@ impl EyeHits {
 fn anaglyph([r, g, b, _]: [u8; 4], right: [u8; 4]) -> [u8; 4] {
     let grey = 0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b);
     [grey.round() as u8, right[1], right[2], 255]
+}
+
+/// Difference of colours between which one may be interpolated, of 255, numerical.
+const ALIKE: u8 = 10;
+
+/// Whether two or four colours differ little.
+fn are_alike(colours: &[[u8; 4]]) -> bool {
+    let Some(first) = colours.first() else { return false };
+    (0..3).all(|c| colours.iter().all(|colour| colour[c].abs_diff(first[c]) <= ALIKE))
 }
 
 /// The mean of two or four colours.

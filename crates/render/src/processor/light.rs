@@ -113,23 +113,42 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, shading: [bool; 2], br
         let normal = if brain.normal.dot(along) > 0.0 { -brain.normal } else { brain.normal };
         return lit(scene, dura_colour(brain.rest), normal, along, open, key, 0.25);
     }
-    let in_sulcus = 1.0 - smoothstep(0.65, 0.95, brain.open);
     let flesh = match inputs.mri {
         Some(signals) if brain.open > 0.5 * (1.0 + PIA) => bare_colour(scene, signals, brain.rest),
-        mri => vessels_over(brain_colour(scene, mri, brain.rest - BELOW_MM * brain.normal), brain.ways, in_sulcus),
+        mri => vessels_over(
+            brain_colour(scene, mri, brain.rest - BELOW_MM * brain.normal),
+            brain.ways,
+            in_sulcus(brain.open),
+        ),
     };
     let colour = painted(flesh);
     let (colour, film) = stained(colour, brain.stain);
     lit(scene, colour, brain.normal, along, open, key, 0.35 + 0.15 * film)
 }
 
+/// Ways, of 2 mm, within which a vein, an artery and a branch are whole, and past which there is
+/// none, numerical.
+const VESSELS: [[f32; 2]; 3] = [[0.20, 0.32], [0.10, 0.20], [0.03, 0.08]];
+
+/// How much a place lies in a sulcus, 0 to 1, by the light of the surroundings there.
+fn in_sulcus(open: f32) -> f32 {
+    1.0 - smoothstep(0.65, 0.95, open)
+}
+
+/// Whether a vessel of the pia is seen, by the ways to them and the light of the surroundings.
+pub(crate) fn has_vessel(look: Vec4) -> bool {
+    let [vein, artery, branch] = VESSELS.map(|[_, end]| end);
+    look.z.abs() < branch || look.y.abs() < artery || look.x.abs() < vein && in_sulcus(look.w) > 0.0
+}
+
 /// Vessels of the pia over a colour, by the ways to them: veins keep to the sulci, arteries and
 /// their branches cross the gyri.
 fn vessels_over(colour: Vec3, ways: Vec3, in_sulcus: f32) -> Vec3 {
-    let line = |low, high, way: f32| 1.0 - smoothstep(low, high, way.abs());
-    let fine = colour.lerp(Vec3::new(0.66, 0.20, 0.17), 0.30 * line(0.03, 0.08, ways.z));
-    let red = fine.lerp(Vec3::new(0.58, 0.09, 0.08), 0.6 * line(0.10, 0.20, ways.y));
-    red.lerp(Vec3::new(0.27, 0.07, 0.13), 0.85 * line(0.20, 0.32, ways.x) * in_sulcus)
+    let [vein, artery, branch] = VESSELS;
+    let line = |[whole, end]: [f32; 2], way: f32| 1.0 - smoothstep(whole, end, way.abs());
+    let fine = colour.lerp(Vec3::new(0.66, 0.20, 0.17), 0.30 * line(branch, ways.z));
+    let red = fine.lerp(Vec3::new(0.58, 0.09, 0.08), 0.6 * line(artery, ways.y));
+    red.lerp(Vec3::new(0.27, 0.07, 0.13), 0.85 * line(vein, ways.x) * in_sulcus)
 }
 
 /// Colour of the dura: pale, with vessels that branch; by the place at rest, mm.

@@ -13,7 +13,8 @@
 //! advances as one beam to where bone may be. Rays skip by the octant of their direction and test
 //! a cell only if its occupancy bit is set (`bricks.rs`). While the camera moves, rays are sparse
 //! ([`Casting::sparse`]): a quarter of the pixels, and the others where neighbouring tangent
-//! planes disagree (`skull.rs`). The hits of the last picture are kept, as on the device. At rest
+//! planes disagree (`skull.rs`); colours between like ones on an even cortex without a vessel are
+//! interpolated too (`eye.rs`). The hits of the last picture are kept, as on the device. At rest
 //! edges are smoothed (`edges.rs`). Triangles of the brain that reach behind the eye are skipped.
 //!
 //! # When not to use it
